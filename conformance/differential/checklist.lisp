@@ -998,3 +998,132 @@ e") (read-from-string "#:g") (read-from-string ":Key")))
                     (mapcar (lambda (case) (setf (readtable-case *readtable*) case)
                               (symbol-name (read-from-string "aBc|d|")))
                             '(:upcase :downcase :preserve :invert)))))
+
+;; methods combined by an operator, most specific first
+;;; 233
+(progn (defclass x233 () ()) (defclass y233 () ()) (defclass z233 (x233 y233) ()) (defclass w233 (y233) ()) (defclass v233 (z233 w233) ())
+(defgeneric who233 (o) (:method-combination list))
+(defmethod who233 list ((o x233)) 'x) (defmethod who233 list ((o y233)) 'y) (defmethod who233 list ((o z233)) 'z) (defmethod who233 list ((o w233)) 'w) (defmethod who233 list ((o v233)) 'v)
+(answer 233 (who233 (make-instance 'v233))))
+
+;; the order of methods for two arguments
+;;; 234
+(progn (defgeneric h234 (a b)) 
+(defmethod h234 ((a integer) (b integer)) (list :ii (call-next-method)))
+(defmethod h234 ((a number) (b integer)) (list :ni (next-method-p)))
+(defmethod h234 ((a integer) b) (list :it (call-next-method a b)))
+(defmethod h234 (a b) :tt)
+(defmethod h234 :around ((a integer) b) (list :around (call-next-method)))
+(defmethod h234 :before (a (b integer)) (princ "before "))
+(defmethod h234 :after (a b) (princ "after "))
+(answer 234 (list (h234 1 2) (h234 1.5 2) (h234 1 'a) (h234 'a 'b))))
+
+;; structures that print themselves
+;;; 235
+(progn (defstruct p235 a b) (defmethod print-object ((o p235) s) (print-unreadable-object (o s :type t) (princ (p235-a o) s)))
+(answer 235 (list (make-p235 :a 1) (princ-to-string (make-p235 :a "x")))))
+
+;; slots that stay, come and go with CHANGE-CLASS
+;;; 236
+(progn (defclass d236 () ((a :initarg :a :initform 1) (b :initarg :b))) (defclass e236 () ((b :initform 7) (c :initarg :c :initform 8)))
+(answer 236 (let* ((d (make-instance 'd236 :b 2)) (r (change-class d 'e236 :c 5))) (list (eq d r) (slot-value d 'b) (slot-value d 'c) (slot-exists-p d 'a) (class-name (class-of d))))))
+
+;; shared parts of literals
+;;; 237
+(answer 237 (let ((*print-circle* t) (l '#1=(a . #1#)) (m '(#2=(1 2) #2# #3=#(#3#)))) (list (eq l (cdr l)) (eq (first m) (second m)) (prin1-to-string l) (prin1-to-string m))))
+
+;; shared strings that are read
+;;; 238
+(answer 238 (let ((*print-circle* t)) (prin1-to-string (read-from-string "(#1=\"ab\" #1# #2=(x #2#) . #1#)"))))
+
+;; bit vectors that are read
+;;; 239
+(answer 239 (list (read-from-string "#*") #*10110 (length #*) (read-from-string "#6*101") (bit #*10 1) (handler-case (read-from-string "#2*101") (reader-error () 'bad))))
+
+;; where operations on bits leave their result
+;;; 240
+(answer 240 (let ((r (make-array 4 :element-type 'bit :initial-element 0))) (list (bit-and #*1100 #*1010 r) r (bit-ior #*1100 #*1010 t) (handler-case (bit-and #*1 #*10) (error () 'differ)) (eq (bit-not r r) r) r)))
+
+;; bits of two dimensions
+;;; 241
+(answer 241 (let ((b (make-array '(2 3) :element-type 'bit :initial-element 1))) (setf (aref b 1 1) 0) (list b (bit-not b) (row-major-aref b 4) (array-total-size b) (array-dimensions b))))
+
+;; fill pointers
+;;; 242
+(answer 242 (let ((v (make-array 3 :adjustable t :fill-pointer 0 :initial-contents '(a b c)))) (list v (vector-push 'x v) (vector-push 'y v) (vector-push 'z v) (vector-push 'w v) (vector-push-extend 'q v 10) v (vector-pop v) (setf (fill-pointer v) 1) v (length v) (array-dimension v 0) (aref v 2))))
+
+;; an array that is adjusted
+;;; 243
+(answer 243 (let* ((a (make-array '(2 3) :adjustable t :initial-contents '((1 2 3) (4 5 6)))) (b (adjust-array a '(3 2) :initial-element 0))) (list (eq a b) b a)))
+
+;; parts of sequences that are read
+;;; 244
+(answer 244 (let ((v (vector 0 0 0 0 0)) (l (list 0 0 0))) (with-input-from-string (s "abcdefgh") (list (read-sequence v s :start 1 :end 3) v (read-sequence l s :start 1) l (read-sequence v s) v (read-sequence v s)))))
+
+;; parts of sequences that are written
+;;; 245
+(answer 245 (with-output-to-string (s) (write-sequence "hello" s :start 1 :end 3) (write-sequence (list #\x #\y) s) (write-sequence (vector #\p #\q #\r) s :end 2) (write-sequence "" s)))
+
+;; broadcast streams
+;;; 246
+(answer 246 (let* ((a (make-string-output-stream)) (b (make-broadcast-stream)) (s (make-broadcast-stream a b))) (print 1 s) (fresh-line s) (terpri s) (write-char #\x s) (list (get-output-stream-string a) (write-line "gone" b) (broadcast-stream-streams b) (input-stream-p s) (output-stream-p s) (open-stream-p s) (progn (close s) (open-stream-p a)))))
+
+;; concatenated streams, as far as they are read
+;;; 247
+(answer 247 (let ((s (make-concatenated-stream (make-string-input-stream "ab") (make-string-input-stream "") (make-string-input-stream (format nil "c~%d"))))) (list (read-char s) (peek-char nil s) (read-line s) (length (concatenated-stream-streams s)) (read-char s) (read-char s nil :eof) (read-line s nil :eof) (concatenated-stream-streams s))))
+
+;; two-way streams
+;;; 248
+(answer 248 (let* ((o (make-string-output-stream)) (s (make-two-way-stream (make-string-input-stream "1 2") o))) (format s "~a" (+ (read s) (read s))) (list (get-output-stream-string o) (read s nil 'end) (input-stream-p s) (output-stream-p s))))
+
+;; names merged with defaults
+;;; 249
+(answer 249 (mapcar #'namestring (list (merge-pathnames "a" "/b/c.d") (merge-pathnames "a/" "/b/c.d") (merge-pathnames "../x" "/b/c/d.e") (merge-pathnames "/a/b" "/c/d.e") (merge-pathnames "" "/b/c.d") (merge-pathnames "a.b" "c/") (merge-pathnames "x/y" "z/w.v") (merge-pathnames (make-pathname :type "q") "/a/b.c"))))
+
+;; places behind symbols
+;;; 250
+(answer 250 (let ((x (list 1 2))) (symbol-macrolet ((a (car x)) (b (cadr x))) (list (setf a 10) (incf b 5) (multiple-value-setq (a b) (values 3 4)) x (let ((a 99)) (setq a 1) a) x (psetq a 7 b a) x (push 1 b) x))))
+
+;; keys and rest of a local macro
+;;; 251
+(answer 251 (macrolet ((m (a &optional (b a) &rest c &key k &allow-other-keys) `'(,a ,b ,c ,k))) (list (m 1) (m 1 2) (m 1 2 :k 3) (m 1 2 :k 3 :l 4))))
+
+;; local macros and functions around each other
+;;; 252
+(answer 252 (macrolet ((f (x) `(* 2 ,x))) (flet ((g (y) (f y))) (macrolet ((f (x) `(+ 1 ,x))) (list (g 4) (f 4) (flet ((f (x) (- x))) (f 4)))))))
+
+;; a destructured macro
+;;; 253
+(answer 253 (macrolet ((m ((a (b &key c) . d) e) `'(,a ,b ,c ,d ,e))) (m (1 (2 :c 3) 4 5) 6)))
+
+;; arrays that are equal
+;;; 254
+(answer 254 (list (equalp #2A((1 2)) #2A((1.0 2))) (equalp "aB" "Ab") (equalp #(1 2) (make-array 2 :fill-pointer 2 :adjustable t :initial-contents '(1 2))) (equal #*101 #*101) (equalp #*101 #(1 0 1)) (equal "a" (make-array 1 :element-type 'character :initial-element #\a :fill-pointer 1))))
+
+;; INITIALIZE-INSTANCE around
+;;; 255
+(progn (defclass m255 () ((v :initform 0 :accessor m255-v))) (defmethod initialize-instance :around ((m m255) &rest args &key (twice nil) &allow-other-keys) (let ((r (call-next-method))) (setf (m255-v m) (list twice (length args))) r))
+(answer 255 (m255-v (make-instance 'm255 :twice t))))
+
+;; keys of methods
+;;; 256
+(progn (defgeneric k256 (x &key a) (:method ((x integer) &key a b) (list x a b)) (:method ((x t) &key a (c 1)) (list x a c)))
+(answer 256 (list (k256 1 :a 2 :b 3) (k256 'x :c 4) (handler-case (k256 1 :zz 3) (error () 'unknown-key)) (k256 1 :c 5))))
+
+;; EQL methods, and classes of the language
+;;; 257
+(progn (defgeneric e257 (x)) (defmethod e257 ((x (eql 5))) (list 'five (call-next-method))) (defmethod e257 ((x integer)) 'int) (defmethod e257 ((x (eql 'a))) 'sym-a) (defmethod e257 ((x null)) 'null) (defmethod e257 ((x list)) 'list) (defmethod e257 ((x sequence)) 'seq) (defmethod e257 ((x string)) (list 'str (call-next-method)))
+(answer 257 (list (e257 5) (e257 6) (e257 'a) (e257 nil) (e257 '(1)) (e257 #(1)) (e257 "s") (handler-case (e257 #\a) (error () 'none)))))
+
+;; the position in a string that is gathered
+;;; 258
+(answer 258 (let ((s (make-string-output-stream))) (write-string "abc" s) (list (file-position s) (get-output-stream-string s) (get-output-stream-string s))))
+
+;; constructors by position
+;;; 259
+(progn (defstruct (q259 (:constructor mk259 (a &optional (b 2) &aux (c (+ a b)))) (:copier nil) (:predicate q259?) (:conc-name q-)) a b c)
+(answer 259 (list (mk259 1) (q-c (mk259 1 5)) (q259? 1) (fboundp 'copy-q259))))
+
+;; indexes of arrays
+;;; 260
+(answer 260 (list (svref #(1 2) 1) (handler-case (svref "ab" 0) (type-error () 'te)) (schar "ab" 0) (sbit #*01 1) (row-major-aref #2A((1 2) (3 4)) 2) (array-row-major-index #2A((1 2) (3 4)) 1 1) (array-in-bounds-p #(1 2) 2) (handler-case (aref #2A((1)) 0) (error () 'rank))))

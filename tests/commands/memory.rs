@@ -125,3 +125,23 @@ fn stacks_that_grow_side_by_side_leave_no_holes() {
     assert!(peak <= 64 + SLACK, "{peak} MiB at most");
     assert!(matches!(status, Some(0 | 1 | 5) | None), "{status:?}");
 }
+
+#[test]
+fn many_tasks_without_room_share_collections() {
+    // Tens of thousands of tasks need memory at the same time, and end for want of it.
+    let text = "(defun split () (or-parallel (a (split)) (b (split))))\n(split)";
+    let folder = super::folder::Folder::new("shared-collections");
+    let path = folder.path().join("split.esl");
+    std::fs::write(&path, text).expect("the program can be written");
+    let memory = format!("{LIMIT}M");
+    let mut command = eslvm(&["run", "--clock", "virtual", "--memory", &memory, "--budget", "2000000"]);
+    let output = command.arg("--stats").arg(&path).output().expect("eslvm starts");
+    let figures = String::from_utf8_lossy(&output.stderr).into_owned();
+    let figure = |name: &str| -> u64 {
+        let line = figures.lines().find(|line| line.split_whitespace().next() == Some(name));
+        line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or_default()
+    };
+    let (tasks, collections) = (figure("tasks"), figure("collections"));
+    assert!(tasks > 10_000, "{figures}");
+    assert!(collections < tasks / 100, "{collections} collections for {tasks} tasks");
+}

@@ -29,7 +29,7 @@ use crate::exchange::Exchange;
 use crate::observe::{Figures, Journal, Observers, Watch};
 use crate::outside::{Operations, Outside};
 use crate::schedule::{Accounts, Clock, Counts, EndOfAll, Points, RunQueues, Scheduler, Timers, Turn};
-use crate::task::{Control, Extra, RunningCleanup, Task};
+use crate::task::{Control, Extra, RunningCleanup, Shortage, Task};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::Deliveries;
@@ -222,6 +222,8 @@ list_state! { Turn {
     critical_left: Run,
     critical_is_new: Run,
     had_attention: Derived,
+    shortage: Run by |&shortage: &Shortage, sink: &mut dyn StateSink| sink.word(shortage as u64),
+    used_before: Derived,
     parking: Derived,
     ending: Derived,
 } }

@@ -256,11 +256,16 @@ pub(super) fn function_documentation(vm: &mut Vm, arguments: &[Value]) -> Outcom
     Ok(texts(vm, arguments[0])?.1)
 }
 
+/// Words of a function among which one is looked for that has a place.
+const WORDS_TO_PLACE: u32 = 64;
+
 pub(super) fn function_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(code) = vm.heap.function_code(arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "FUNCTION");
     };
-    let Some(place) = vm.world.source_place(&vm.heap, code, 0) else { return Ok(Value::NIL) };
+    // What comes before the first call may have no place.
+    let place = (0..WORDS_TO_PLACE).find_map(|pc| vm.world.source_place(&vm.heap, code, pc));
+    let Some(place) = place else { return Ok(Value::NIL) };
     let source = vm.heap.alloc_str(&place.source)?;
     Ok(vm.heap.list(&[source, Value::index(place.line as usize), Value::index(place.column as usize)])?)
 }

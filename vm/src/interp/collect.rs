@@ -292,6 +292,9 @@ impl Vm {
                     mark_roots(heap, world, compiler, exchange, embedder, deliveries, outside);
                     for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                         scan(heap, task);
+                        if task.flags.lacks_room() {
+                            task.flags.set_collected_for(true);
+                        }
                     }
                     tasks.visit_standstills(&mut |value| heap.mark(value));
                 },

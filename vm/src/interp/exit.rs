@@ -9,7 +9,8 @@ use super::{Signal, aux_at, failure, word_at};
 use crate::describe::describe;
 use crate::raise::{Exit, Raised};
 use crate::saved_pc::SavedPc;
-use crate::task::TaskEnd;
+use crate::schedule::TurnEnd;
+use crate::task::{Shortage, TaskEnd};
 use crate::vm::Vm;
 
 /// Live bytes over which a collection goes in the time of a tick, about.
@@ -83,8 +84,8 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
     unsafe { call(vm, function, &*arguments, FramePlace::Above) }
 }
 
-/// Collects, so that the instruction at `vm.cpu.pc()` is done again with more room; if that did not help the
-/// last time, the heap is exhausted.
+/// Has the instruction at `vm.cpu.pc()` done again: in the task's next turn, where there is room for it or
+/// not yet, and then after a collection. If that did not help, the heap is exhausted.
 ///
 /// # Safety
 /// The contract of [`super::settle`].
@@ -97,18 +98,41 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         vm.cpu.ticks += 1;
     }
     let place = (SavedPc::new(vm.cpu.pc()), vm.scheduler.task().ticks, vm.cpu.ticks);
-    if vm.exchange.collected_at == Some(place) {
-        vm.exchange.collected_at = None;
-        if vm.open_cleanup_memory() {
-            return Signal::Reload;
-        }
-        if is_call {
-            vm.cpu.ticks -= 1;
-        }
-        if !vm.heap.open_reserve() {
-            vm.leave_reserve(vm.world.known.heap_exhausted);
-            return Signal::Unwind;
-        }
+    let turn = &mut vm.scheduler.turn;
+    // The turn begins with what there was no room for in the last one.
+    let is_retry = turn.used_before + vm.cpu.used() <= 1;
+    let shortage = std::mem::take(&mut turn.shortage);
+    let has_collected = vm.exchange.collected_at.take() == Some(place);
+    if has_collected || is_retry && shortage == Shortage::Collected {
+        return run_out(vm, is_call, has_collected);
+    }
+    let task = vm.scheduler.task_mut();
+    if task.critical == 0 && !(is_retry && shortage == Shortage::Noted) {
+        // One collection does for all tasks that lack room in this round: that of the first to come here
+        // again.
+        task.flags.set_lacks_room(true);
+        vm.scheduler.turn.end_with(TurnEnd::Passed);
+        return Signal::Again;
+    }
+    vm.exchange.collected_at = Some(place);
+    vm.collect_fully();
+    Signal::Reload
+}
+
+/// Deals with an instruction for which there is no room although everything has been collected, in this turn
+/// or since the last one.
+fn run_out(vm: &mut Vm, is_call: bool, has_collected: bool) -> Signal {
+    if vm.open_cleanup_memory() {
+        return Signal::Reload;
+    }
+    if is_call {
+        vm.cpu.ticks -= 1;
+    }
+    if !vm.heap.open_reserve() {
+        vm.leave_reserve(vm.world.known.heap_exhausted);
+        return Signal::Unwind;
+    }
+    if has_collected {
         // A task that goes on failing for want of memory does not get its collections for nothing. But its
         // critical section is not to be over because of them: the failure has yet to be handled there.
         let ticks = vm.heap.stats().live / BYTES_PER_TICK;
@@ -116,9 +140,6 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         if vm.scheduler.task().critical > 0 {
             vm.scheduler.turn.extend_critical(ticks);
         }
-        return failure(vm, Raised::HeapExhausted);
     }
-    vm.exchange.collected_at = Some(place);
-    vm.collect_fully();
-    Signal::Reload
+    failure(vm, Raised::HeapExhausted)
 }

@@ -68,31 +68,34 @@ pub(super) fn finish_task(vm: &mut Vm) {
     let is_awaited = event::is_awaited(&vm.heap, object);
     let arguments: &[Value] = if is_awaited { &[vm.world.known.task_end] } else { &[] };
     allocate_without_retry(vm, |vm| vm.signal_event(object, arguments).map(|()| Value::NIL));
-    if vm.heap.is(notify, Kind::Wait) {
-        let cell = allocate_without_retry(vm, |vm| Ok(vm.heap.cons(object, Value::NIL)?));
-        keep(vm, notify, cell, object);
+    if let Some(cell) = vm.heap.as_cons(notify) {
+        vm.heap.set_car(notify, object);
+        keep(vm, cell.car, notify, object);
     } else if notify.is_true() {
         interrupt_by(vm, notify);
     }
     end_run_if_over(vm, end);
 }
 
-/// Allocates where an instruction cannot be done again, at the end of a task or between turns: with a
-/// collection if need be, and with the reserve of the heap.
+/// Allocates where an instruction cannot be done again, at the end of a task or between turns: with the
+/// reserve of the heap if need be, and with a collection.
 pub(super) fn allocate_without_retry(
     vm: &mut Vm,
     mut allocate: impl FnMut(&mut Vm) -> Result<Value, Exit>,
 ) -> Value {
-    for attempt in 0..3 {
-        if let Ok(value) = allocate(vm) {
-            return value;
-        }
-        match attempt {
-            0 => vm.collect_fully(),
-            _ => _ = vm.heap.open_reserve(),
-        }
+    if let Ok(value) = allocate(vm) {
+        return value;
     }
-    Value::NIL
+    // Many tasks may end while there is no room: not each of them is worth a collection.
+    let opens = vm.heap.open_reserve();
+    let value = allocate(vm).or_else(|_| {
+        vm.collect_fully();
+        allocate(vm)
+    });
+    if opens {
+        vm.heap.close_reserve();
+    }
+    value.unwrap_or(Value::NIL)
 }
 
 /// Reports the failure that has ended the running task, unless a task waits for it or the embedder wants to.

@@ -29,7 +29,7 @@ pub(crate) struct SpawnOptions {
     pub hidden: bool,
     /// Whether it works for all: it has no bindings of its maker, and charges no account.
     pub is_service: bool,
-    /// Who is told of its end, see [`crate::task::Task::notify`].
+    /// Who is told of its end: a wait, a guard, or `NIL`.
     pub notify: Value,
 }
 
@@ -153,6 +153,9 @@ pub(crate) fn make_task(
     if let Some(maker) = maker.filter(|_| !options.is_service) {
         slots[event::RESULT] = lineage::node_of(heap, maker.object)?;
     }
+    // What takes the task into the queue of the wait at its end is made now.
+    let is_wait = heap.is(options.notify, Kind::Wait);
+    let notify = if is_wait { heap.cons(options.notify, Value::NIL)? } else { options.notify };
     let object = heap.alloc_record(Kind::Task, 0, 0, &slots)?;
     let mut task = scheduler.tasks.make(heap, object, words);
     interp::start::first_frame(heap, &mut task, scheduler.starter, function, arguments);
@@ -160,13 +163,14 @@ pub(crate) fn make_task(
     // task that has been scanned, or of the host.
     heap.log_if_marking(function);
     heap.log_if_marking(arguments);
+    heap.log_if_marking(notify);
     heap.log_if_marking(options.notify);
     task.scanned = heap.cycle_id();
     scheduler.counts.made += 1;
     task.number = TaskNumber(scheduler.counts.made);
     task.serial = scheduler.serial.advance();
     task.priority = options.priority;
-    task.notify = options.notify;
+    task.notify = notify;
     task.flags.set_daemon(options.daemon);
     task.flags.set_hidden(options.hidden);
     if let Some(fund) = fund {

@@ -146,6 +146,8 @@ fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>, portion: u64)
     turn.index = index;
     turn.end = TurnEnd::Spent;
     turn.had_attention = task.flags.attention();
+    turn.shortage = task.flags.take_shortage();
+    turn.used_before = 0;
     make_running(vm, task);
     let left = vm.scheduler.slice_length(&vm.config);
     interp::load(vm, left.min(portion) as i32);
@@ -159,6 +161,7 @@ fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>, portion: u64)
 /// Makes a task the running one, and runs it for a further portion of its slice.
 fn go_on_with_slice(vm: &mut Vm, task: Box<Task>, slice: OpenSlice, portion: u64) -> Leave {
     make_running(vm, task);
+    vm.scheduler.turn.used_before = slice.used;
     interp::load(vm, slice.left.min(portion) as i32);
     vm.cpu.collections = slice.collections;
     interp::run(vm)

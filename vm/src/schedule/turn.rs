@@ -1,6 +1,6 @@
 //! The turn of the running task.
 
-use crate::task::{TaskEnd, TaskIndex};
+use crate::task::{Shortage, TaskEnd, TaskIndex};
 
 /// Why a task is about to park.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,6 +42,10 @@ pub(crate) struct Turn {
     pub(crate) critical_is_new: bool,
     /// Whether something was noted of it when its slice began.
     pub(crate) had_attention: bool,
+    /// For what want of room its last turn has ended.
+    pub(crate) shortage: Shortage,
+    /// Ticks used in the present slice before the present portion.
+    pub(crate) used_before: u64,
     /// Why it is about to park.
     pub(crate) parking: Parking,
     /// How it ends, once its unwinding has reached the root.
@@ -71,6 +75,8 @@ impl Default for Turn {
             critical_left: 0,
             critical_is_new: false,
             had_attention: false,
+            shortage: Shortage::default(),
+            used_before: 0,
             parking: Parking::default(),
             ending: None,
         }

@@ -66,7 +66,8 @@ pub(crate) struct Task {
     pub object: Value,
     /// Wait at which it is parked, until it goes on; otherwise `NIL`.
     pub wait: Value,
-    /// Told of its end, beside the waits for it: the wait of a net, a guard, or `NIL`.
+    /// Told of its end, beside the waits for it: a cons with the wait of a net, into whose queue it is put
+    /// then, so that the end needs no memory; a guard; or `NIL`.
     pub notify: Value,
     /// Ticks used.
     pub ticks: u64,
@@ -153,6 +154,36 @@ define_flags! {
     uses_cleanup_memory set_uses_cleanup_memory = 12;
     /// A cleanup has made it, or a task that works for one.
     serves_cleanup set_serves_cleanup = 13;
+    /// Its last turn has ended since there was no room for something, which it does again in the next.
+    lacks_room set_lacks_room = 14;
+    /// Since it came to lack room, everything has been collected.
+    collected_for set_collected_for = 15;
+}
+
+/// What is known of the lack of room for which a task's last turn has ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Shortage {
+    /// That was not how it ended.
+    #[default]
+    None,
+    /// Nothing has been done about it.
+    Noted,
+    /// Everything has been collected since, in the turn of another task.
+    Collected,
+}
+
+impl Flags {
+    /// Returns for what want of room the last turn has ended, and notes that another has begun.
+    #[inline(always)]
+    pub(crate) fn take_shortage(&mut self) -> Shortage {
+        if !self.lacks_room() {
+            return Shortage::None;
+        }
+        let is_collected = self.collected_for();
+        self.set_lacks_room(false);
+        self.set_collected_for(false);
+        if is_collected { Shortage::Collected } else { Shortage::Noted }
+    }
 }
 
 /// Report of a failure.
