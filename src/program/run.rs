@@ -190,7 +190,7 @@ pub fn run_in_portions(
     machine: &mut Vm,
     program: &Program,
     ticks: u64,
-    look: &mut dyn FnMut(&Vm),
+    look: &mut dyn FnMut(&mut Vm),
 ) -> Result<Summary, Error> {
     run_as(machine, program, |machine| {
         loop {

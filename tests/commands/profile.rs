@@ -25,7 +25,11 @@ fn a_profile_has_all_ticks_of_the_run_by_task_function_and_line() {
         line.split_whitespace().nth(1).and_then(|ticks| ticks.parse::<u64>().ok()).expect("it is a number")
     };
     assert_eq!(ticks_of(&plain.errors), ticks_of(&profiled.errors), "the run is the same");
-    assert!(profiled.errors.lines().any(|line| line.ends_with("  SPIN")), "{}", profiled.errors);
+    let row = profiled.errors.lines().find(|line| line.ends_with("  SPIN")).expect("there is a row");
+    let [own, all, time, all_time, _] = row.split_whitespace().collect::<Vec<_>>()[..] else {
+        panic!("{row}")
+    };
+    assert!(own == all && time == all_time && time.parse::<f64>().is_ok_and(|time| time > 0.0), "{row}");
 
     let text = std::fs::read_to_string(&lines).expect("it was written");
     let rows: Vec<(&str, u64)> = text
@@ -36,8 +40,7 @@ fn a_profile_has_all_ticks_of_the_run_by_task_function_and_line() {
     let sum = |word: &str| {
         rows.iter().filter(|(stack, _)| stack.contains(word)).map(|(_, ticks)| ticks).sum::<u64>()
     };
-    // What is cleaned up after the end of the program is not part of it.
-    assert!(sum("") <= ticks_of(&plain.errors) && sum("") * 100 > ticks_of(&plain.errors) * 99, "{text}");
+    assert_eq!(sum(""), ticks_of(&plain.errors), "{text}");
     assert!(sum("SPIN") > 90_000 && sum("MUCH;SPIN") > 5 * sum("LITTLE;SPIN"), "{text}");
     assert!(rows.iter().any(|(stack, _)| stack.contains("SPIN;") && stack.contains("spin.esl:")), "{text}");
 }
@@ -54,10 +57,18 @@ fn profiles_have_the_form_that_their_name_asks_for() {
     assert!(drawing.contains("<svg") && drawing.contains("SPIN"), "{drawing}");
     let data = std::fs::read_to_string(data).expect("it was written");
     let data: serde_json::Value = serde_json::from_str(&data).expect("it is JSON");
-    let profile = &data["profiles"][0];
-    let sum: u64 =
-        profile["weights"].as_array().expect("a list").iter().filter_map(|weight| weight.as_u64()).sum();
-    assert_eq!(Some(sum), profile["endValue"].as_u64());
+    for (number, unit) in [(0, "none"), (1, "nanoseconds")] {
+        let profile = &data["profiles"][number];
+        let weights = profile["weights"].as_array().expect("a list");
+        let sum: u64 = weights.iter().filter_map(|weight| weight.as_u64()).sum();
+        assert_eq!((profile["unit"].as_str(), profile["endValue"].as_u64()), (Some(unit), Some(sum)));
+        assert!(sum > 0, "{unit}");
+    }
+    let time = folder.join("time.svg");
+    let arguments = ["run", "--profile", &time, "--profile-unit", "time", &program];
+    assert_eq!(run(&mut eslvm(&arguments), "").status, Some(0));
+    let drawing = std::fs::read_to_string(time).expect("it was written");
+    assert!(drawing.contains("Time of the run") && drawing.contains(" ns,"), "{drawing}");
     let refused = run(&mut eslvm(&["run", "--profile", &program, &program]), "");
     assert_eq!(refused.status, Some(2), "the program itself is not overwritten");
 }

@@ -252,10 +252,12 @@ list_state! { Embedder {
 list_state! { Watch {
     is_watched: Derived,
     is_followed: Derived,
+    are_turns_noted: Derived,
     tells_variables: Process,
     observers: Process,
     coming: Process,
     figures: Process,
+    meter: Process,
     journal: Process,
     traces_tasks: Process,
     passages: Process,

@@ -1,6 +1,6 @@
 //! Figures of a run, as `--stats` prints them.
 
-use esl::profile::Profile;
+use esl::profile::{Profile, ProfiledFunction, UsedResources};
 use esl::program::Summary;
 use esl_vm::vm::{Tier, Vm};
 
@@ -38,9 +38,12 @@ pub(crate) fn print_stats(machine: &Vm, summary: &Summary, seconds: f64) {
 
 /// Prints the functions that have used most ticks.
 pub(crate) fn print_functions(profile: &Profile) {
-    eprintln!("\n{:>14} {:>14}  function", "own ticks", "with calls");
+    let milliseconds = |used: UsedResources| used.nanoseconds as f64 / 1e6;
+    eprintln!("\n{:>14} {:>14} {:>12} {:>12}  function", "own ticks", "with calls", "own ms", "with calls");
     for function in profile.functions().iter().take(SHOWN_FUNCTIONS) {
-        eprintln!("{:>14} {:>14}  {}", function.own, function.total, function.name);
+        let ProfiledFunction { name, own, total } = function;
+        let (own_time, time) = (milliseconds(*own), milliseconds(*total));
+        eprintln!("{:>14} {:>14} {own_time:>12.3} {time:>12.3}  {name}", own.ticks, total.ticks);
     }
 }
 

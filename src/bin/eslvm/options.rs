@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 use esl::Config;
 use esl::command::{self, RightsOptions};
 use esl::operate::OperateOptions;
+use esl::profile::ProfileUnit;
 use esl::replay::ReplayOptions;
 use esl_vm::value::Value;
 use esl_vm::vm::Tier;
@@ -75,10 +76,14 @@ pub(crate) enum EslvmAction {
         /// Record the run in a file, for `eslvm replay`: the program, and everything that reaches it
         #[arg(long, value_name = "FILE")]
         record: Option<PathBuf>,
-        /// Write to a file which calls and lines have used the ticks: a flame graph if its name ends in
-        /// `.svg`, for speedscope if it ends in `.json`, else a line for each stack
+        /// Write to a file which tasks, calls and lines have used the ticks and the time: a flame graph if
+        /// its name ends in `.svg`, for speedscope if it ends in `.json`, else a line for each stack
         #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
         profile: Option<PathBuf>,
+        /// What a flame graph, and the lines of stacks, count; data for speedscope have both
+        #[arg(long, value_enum, default_value_t = ProfileUnit::Ticks, value_name = "UNIT")]
+        #[arg(requires = "profile")]
+        profile_unit: ProfileUnit,
         /// Write to a file, in the form of lcov, how often each line, function and arm was run
         #[arg(long, value_name = "FILE", conflicts_with_all = ["schedule", "record"])]
         coverage: Option<PathBuf>,

@@ -7,7 +7,7 @@ use esl::explore::Schedule;
 use esl::host::{Host, RealHost, RecordingHost};
 use esl::module_path::ModulePath;
 use esl::operate::OperateOptions;
-use esl::profile::{INTERVAL, Profile};
+use esl::profile::{INTERVAL, Profile, ProfileUnit};
 use esl::program::{self, Ended, Program};
 use esl::replay::{self, FileRecorder, RunSetup};
 use esl::timeline::Timeline;
@@ -23,6 +23,7 @@ pub(crate) struct RunReports<'a> {
     pub(crate) timeline: Option<&'a Path>,
     pub(crate) record: Option<&'a Path>,
     pub(crate) profile: Option<&'a Path>,
+    pub(crate) profile_unit: ProfileUnit,
     pub(crate) coverage: Option<&'a Path>,
     pub(crate) trace: &'a [String],
     pub(crate) operate: &'a OperateOptions,
@@ -41,7 +42,18 @@ pub(crate) fn run(
     schedule: Option<&Schedule>,
     path: &ModulePath,
 ) -> Result<u8, u8> {
-    let RunReports { stats, tier, timeline, profile, coverage, record, trace, operate, is_quiet } = *reports;
+    let RunReports {
+        stats,
+        tier,
+        timeline,
+        profile,
+        profile_unit,
+        coverage,
+        record,
+        trace,
+        operate,
+        is_quiet,
+    } = *reports;
     for output in [timeline, profile, coverage, record].into_iter().flatten() {
         command::refuse_overwriting(output, [file])?;
     }
@@ -103,17 +115,22 @@ pub(crate) fn run(
     let served = operate.begin(&mut machine)?;
     let started = std::time::Instant::now();
     let is_profiled = profile.is_some() || stats == Some(Stats::Functions);
-    let mut found = Profile::new();
+    let mut found = is_profiled.then(|| Profile::begin(&mut machine));
     let summary = match schedule {
         Some(schedule) => program::run_by(&mut machine, &program, &schedule.settings(), schedule.choices()),
-        None if is_profiled => {
-            program::run_in_portions(&mut machine, &program, INTERVAL, &mut |machine| found.look(machine))
-        }
-        None => program::run_in(&mut machine, &program),
+        None => match &mut found {
+            Some(found) => {
+                program::run_in_portions(&mut machine, &program, INTERVAL, &mut |machine| found.look(machine))
+            }
+            None => program::run_in(&mut machine, &program),
+        },
     };
     let summary = summary.map_err(setup)?;
     let seconds = started.elapsed().as_secs_f64();
     drop(served);
+    if let Some(found) = &mut found {
+        found.end(&mut machine);
+    }
     let mut status = command::exit_status(summary.ended);
     if let Some((recorder, path)) = recording
         && let Err(error) = recorder.end(&machine, status)
@@ -125,8 +142,8 @@ pub(crate) fn run(
     {
         status = not_written(path, &error);
     }
-    if let Some(path) = profile
-        && let Err(error) = found.write(path)
+    if let (Some(path), Some(found)) = (profile, &found)
+        && let Err(error) = found.write(path, profile_unit)
     {
         status = not_written(path, &error);
     }
@@ -152,8 +169,8 @@ pub(crate) fn run(
         if stats == Stats::Tasks {
             print_tasks(&machine);
         }
-        if stats == Stats::Functions {
-            print_functions(&found);
+        if let (Stats::Functions, Some(found)) = (stats, &found) {
+            print_functions(found);
         }
         if let (Stats::Coverage, Some(report)) = (stats, &covered) {
             eprint!("\n{}", report.table());

@@ -5,11 +5,14 @@
 
 mod figures;
 mod journal;
+mod meter;
 mod observer;
 
 pub(crate) use figures::Figures;
 pub use figures::{Pauses, TaskFigures};
 pub(crate) use journal::Journal;
+pub(crate) use meter::Meter;
+pub use meter::UsedResources;
 pub(crate) use observer::Observers;
 pub use observer::{Coming, Observer, Seen};
 
@@ -30,6 +33,17 @@ pub struct StandingFrame {
     pub variables: Vec<FrameVariable>,
 }
 
+/// The calls in which a task stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OpenCalls {
+    /// The task, as reports call it.
+    pub task: String,
+    /// Names of the functions, innermost first.
+    pub functions: Vec<String>,
+    /// Where the innermost call stands, if that is known.
+    pub place: Option<SourcePlace>,
+}
+
 /// Everything that is kept for those who watch a run.
 #[derive(Default)]
 pub(crate) struct Watch {
@@ -39,12 +53,16 @@ pub(crate) struct Watch {
     pub(crate) is_followed: bool,
     /// Whether reports of failures are kept with the variables of their frames.
     pub(crate) tells_variables: bool,
+    /// Whether turns are to be told of, or measured.
+    pub(crate) are_turns_noted: bool,
     /// The observers.
     pub(crate) observers: Observers,
     /// Observers on their way.
     pub(crate) coming: Coming,
     /// The figures.
     pub(crate) figures: Figures,
+    /// What tasks use in their turns.
+    pub(crate) meter: Meter,
     /// What has happened, for those who look at the run.
     pub(crate) journal: Journal,
     /// Whether what happens to tasks is written to the stream for reports.
@@ -54,10 +72,11 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Updates `is_watched` and `is_followed`.
+    /// Updates `is_watched`, `is_followed` and `are_turns_noted`.
     pub(crate) fn update_is_watched(&mut self) {
         self.is_followed = self.traces_tasks || !self.observers.list.is_empty() || self.figures.of_tasks;
-        self.is_watched = self.is_followed || self.figures.are_wanted || self.journal.is_kept;
+        self.are_turns_noted = self.is_followed || self.meter.is_on;
+        self.is_watched = self.are_turns_noted || self.figures.are_wanted || self.journal.is_kept;
     }
 
     /// Counts that control passes a place, if that is wanted.

@@ -11,6 +11,7 @@ mod tasks;
 mod trace;
 mod variables;
 
+pub(crate) use calls::note_end_in_meter;
 pub(crate) use figures::note_end_in_figures;
 pub(crate) use label::{
     cause_label, end_label, event_label, failure_arguments, label_of, lack_of, reason_of, report_in_short,

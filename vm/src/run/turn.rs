@@ -13,7 +13,7 @@ use crate::interp::{self, Leave};
 use crate::observe::Seen;
 use crate::report::{self, Happening};
 use crate::schedule::{Due, Measure, OpenSlice, OpenTurn, Parking, TurnEnd};
-use crate::task::{AccountId, Task, TaskIndex, TaskState};
+use crate::task::{AccountId, Task, TaskIndex, TaskNumber, TaskState};
 use crate::vm::Vm;
 
 /// Gives a runnable task its turn: one slice, or as many as it takes to leave a critical section. `end` is
@@ -173,8 +173,8 @@ fn make_running(vm: &mut Vm, task: Box<Task>) {
     let number = task.number;
     vm.heap.lend_to_cleanup(task.flags.uses_cleanup_memory());
     vm.scheduler.running = Some(task);
-    if vm.watch.is_followed {
-        report::show(vm, number, Seen::Runs);
+    if vm.watch.are_turns_noted {
+        note_turn(vm, number);
     }
     vm.scan_before_running();
 }
@@ -183,8 +183,8 @@ fn make_running(vm: &mut Vm, task: Box<Task>) {
 #[cold]
 fn leave_slice_open(vm: &mut Vm, slice: OpenSlice) {
     vm.save_cpu();
-    if vm.watch.is_followed {
-        tell_how_turn_ended(vm, Leave::Slice);
+    if vm.watch.are_turns_noted {
+        note_end_of_turn(vm, Leave::Slice);
     }
     put_back(vm, Leave::Slice);
     vm.scheduler.leave_open(Some(slice));
@@ -211,8 +211,8 @@ fn end_slice(vm: &mut Vm, slice: OpenSlice, leave: Leave) {
         charge_account(vm, account, Measure::Ticks, used);
         charge_account(vm, account, Measure::Bytes, bytes);
     }
-    if vm.watch.is_followed {
-        tell_how_turn_ended(vm, leave);
+    if vm.watch.are_turns_noted {
+        note_end_of_turn(vm, leave);
     }
     put_back(vm, leave);
 }
@@ -251,10 +251,33 @@ fn put_back(vm: &mut Vm, leave: Leave) {
     }
 }
 
-/// Tells observers that the turn of the running task is over. Waits are told of when the task is parked.
+/// Notes that the turn of the running task begins, or goes on.
 #[cold]
-fn tell_how_turn_ended(vm: &mut Vm, leave: Leave) {
+fn note_turn(vm: &mut Vm, number: TaskNumber) {
+    if vm.watch.is_followed {
+        report::show(vm, number, Seen::Runs);
+    }
+    if vm.watch.meter.is_on {
+        let now = vm.used_so_far();
+        vm.watch.meter.begin_turn(now);
+    }
+}
+
+/// Notes that the turn of the running task is over, or stays open. Waits are told of when the task is parked.
+#[cold]
+fn note_end_of_turn(vm: &mut Vm, leave: Leave) {
     let number = vm.scheduler.task().number;
+    if vm.watch.meter.is_on {
+        let task = (vm.scheduler.turn.index, number);
+        let now = vm.used_so_far();
+        vm.watch.meter.end_turn(now, task);
+        if leave == Leave::Ended {
+            report::note_end_in_meter(vm);
+        }
+    }
+    if !vm.watch.is_followed {
+        return;
+    }
     match leave {
         Leave::Slice => vm.watch.end_turn(&mut vm.outside.host, &vm.scheduler, number),
         Leave::Parked => {}
