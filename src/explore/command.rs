@@ -11,8 +11,8 @@ use esl_vm::vm::Vm;
 use serde_json::json;
 
 use super::{
-    Behaviour, Exploration, Grain, Schedule, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
-    TimerGrain, explore_together, tell_switches,
+    Behaviour, Exploration, Grain, Livelock, Schedule, SearchLimit, SearchProgress, Settings, StandingTask,
+    Switch, TimerGrain, explore_together, tell_switches,
 };
 use crate::command::{self, FAILED, NOT_PROVED, SUCCESS, StatusLine, USAGE, complain};
 use crate::error::Error;
@@ -49,6 +49,8 @@ struct Finding {
     choices: Vec<u32>,
     /// Whether the schedule comes to an end.
     ends: bool,
+    /// Number of switches at the end that can be repeated for ever.
+    repeated: usize,
     /// What is told of the end: the report of a deadlock or of a failure.
     errors: String,
 }
@@ -111,7 +113,10 @@ pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &Explorat
     }
     let seconds = started.elapsed().as_secs_f64();
     if options.json {
-        let limit = found.limit.map(|limit| format!("{limit:?}").to_lowercase());
+        let limit = found.limit.map(|limit| match limit {
+            SearchLimit::Asked => "time".into(),
+            limit => format!("{limit:?}").to_lowercase(),
+        });
         let (states, runs, count) = (found.states, found.runs, findings.len());
         say!(
             "{}",
@@ -147,13 +152,21 @@ fn findings(found: &Exploration<Behaviour>) -> Vec<Finding> {
                 what,
                 choices: ending.choices.clone(),
                 ends: true,
+                repeated: 0,
                 errors: errors.clone(),
             });
         }
     }
     if let Some(choices) = &found.endless {
         let what = "from here on, the program never ends".into();
-        findings.push(Finding { what, choices: choices.clone(), ends: false, errors: String::new() });
+        let choices = choices.clone();
+        findings.push(Finding { what, choices, ends: false, repeated: 0, errors: String::new() });
+    }
+    if let Some(Livelock { choices, lap }) = &found.livelock {
+        let what = "tasks can go on for ever, though each has its turns".into();
+        let repeated = choices[*lap..].iter().filter(|&&choice| choice > 0).count();
+        let choices = choices.clone();
+        findings.push(Finding { what, choices, ends: false, repeated, errors: String::new() });
     }
     findings
 }
@@ -202,12 +215,21 @@ fn tell(
     if options.json {
         let switches: Vec<_> = switches.iter().map(|switch| text(switch, lines)).collect();
         let (what, errors) = (&finding.what, &finding.errors);
-        say!("{}", json!({ "finding": what, "switches": switches, "report": errors, "schedule": name }));
+        let repeated = finding.repeated;
+        say!(
+            "{}",
+            json!({ "finding": what, "switches": switches, "repeated": repeated, "report": errors, "schedule": name })
+        );
         return Ok(());
     }
     say!("finding {number}: {}", finding.what);
     for (switch, number) in switches.iter().zip(1..) {
         say!("  {number}. {}", text(switch, lines).replace('\n', "\n     "));
+    }
+    match (finding.repeated, switches.len()) {
+        (0, _) => {}
+        (1, number) => say!("  then {number} again, and so on"),
+        (repeated, number) => say!("  then {} to {number} again, and so on", number + 1 - repeated),
     }
     finding.errors.lines().for_each(|line| say!("  {line}"));
     say!("  again: eslvm run --schedule {name} {}\n", file.display());

@@ -26,8 +26,8 @@ mod schedule;
 #[cfg(feature = "cli")]
 pub use command::{ExplorationOptions, read_schedule, run};
 pub use esl_vm::explore::{
-    Exploration, ExploredEnding, Grain, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
-    TimerGrain,
+    Exploration, ExploredEnding, Grain, Livelock, SearchLimit, SearchProgress, Settings, StandingTask,
+    Switch, TimerGrain,
 };
 use esl_vm::host::{Captured, VirtualHost};
 use esl_vm::task::TaskId;

@@ -62,7 +62,10 @@ pub fn new_project(folder: &Path) -> u8 {
     }
     let shown = folder.display().to_string();
     let is_plain = |c: char| c.is_alphanumeric() || "/._-".contains(c);
-    let word = if shown.chars().all(is_plain) { shown.clone() } else { format!("'{shown}'") };
+    // What begins like an option is a folder of this one.
+    let path = if shown.starts_with('-') { format!("./{shown}") } else { shown.clone() };
+    let quoted = || format!("'{}'", path.replace('\'', "'\\''"));
+    let word = if path.chars().all(is_plain) { path.clone() } else { quoted() };
     complain(format_args!(
         "made {shown}; go on with `cd {word} && eslvm run main.esl && eslvm test test.esl`"
     ));

@@ -203,6 +203,10 @@ fn explore(program: &Program, test: &Test, setup: &Setup) -> Result<Verdict, Err
         _ if found.endless.is_some() => {
             Verdict::Failed { why: "a schedule leads to where it never ends".into(), output: String::new() }
         }
+        _ if found.livelock.is_some() => Verdict::Failed {
+            why: "tasks can go on for ever, though each has its turns".into(),
+            output: String::new(),
+        },
         _ if found.limit.is_some() => Verdict::Failed {
             why: format!("after {} states there are schedules left that were not tried", found.states),
             output: String::new(),

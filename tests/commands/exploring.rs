@@ -295,3 +295,36 @@ fn the_manual_shows_what_is_found() {
     }
     assert_eq!(tried, 2);
 }
+
+#[test]
+fn a_livelock_is_found_and_told_with_what_repeats() {
+    let folder = Folder::new("exploring-livelock");
+    folder.file(
+        "polite.esl",
+        "(defvar *left* nil)
+(defvar *right* nil)
+(defun eat (first second)
+  (loop
+    (setf (symbol-value first) t)
+    (sleep 0)
+    (unless (symbol-value second)
+      (setf (symbol-value first) nil)
+      (return))
+    (setf (symbol-value first) nil)
+    (sleep 0)))
+(task-net (a (eat '*left* '*right*)) (b (eat '*right* '*left*)))
+",
+    );
+    let (status, output, errors) = run(&folder, &["explore", "polite.esl"]);
+    assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
+    assert!(
+        output.starts_with("finding 1: tasks can go on for ever, though each has its turns\n"),
+        "{output}"
+    );
+    assert!(output.contains("\n  then ") && output.contains(" again, and so on\n  again: "), "{output}");
+    let (_, output, _) = run(&folder, &["explore", "--json", "polite.esl"]);
+    assert!(output.contains("\"repeated\":"), "{output}");
+    let (status, ..) =
+        run(&folder, &["run", "--budget", "100000", "--schedule", "polite-1.schedule", "polite.esl"]);
+    assert_eq!(status, Some(5), "it goes on for ever");
+}

@@ -10,7 +10,9 @@ mod resources;
 mod suspension;
 mod variables;
 
-use esl::explore::{Behaviour, Exploration, Grain, Settings, explore, explore_together, follow};
+use esl::Config;
+use esl::explore::{Behaviour, Exploration, Grain, Livelock, Settings, explore, explore_together, follow};
+use esl::host::VirtualHost;
 use esl::program::{self, Ended, Program, Source};
 
 pub(crate) fn compile(text: &str) -> Program {
@@ -212,4 +214,50 @@ fn endless_runs_are_distinguished_from_possibly_endless_ones() {
     assert!(found.has_cycle && found.endless.is_none(), "{found:?}");
     let found = endings("(spawn (loop (sleep 0)))", Grain::Changes);
     assert!(found.has_cycle && found.endless.is_some() && found.endings.is_empty(), "{found:?}");
+}
+
+/// Two tasks that take two things each, in different orders, and give back the first if the second is taken.
+const POLITE: &str = "(defvar *left* nil)
+    (defvar *right* nil)
+    (defun take-up (thing) (without-interrupts (unless (symbol-value thing) (setf (symbol-value thing) t))))
+    (defun eat (name first second)
+      (loop
+        (princ name)
+        (loop until (take-up first) do (sleep 0))
+        (sleep 0)
+        (when (take-up second)
+          (setf (symbol-value second) nil)
+          (setf (symbol-value first) nil)
+          (return))
+        (setf (symbol-value first) nil)
+        (sleep 0)))
+    (task-net (a (eat 'a '*left* '*right*)) (b (eat 'b '*right* '*left*)))";
+
+#[test]
+fn a_livelock_goes_round_as_often_as_one_likes() {
+    let program = compile(POLITE);
+    let settings = Settings { output: false, ..Settings::default() };
+    let found = explore(&program, &settings).expect("it runs");
+    assert!(found.endless.is_none() && found.limit.is_none(), "{found:?}");
+    let Livelock { choices, lap } = found.livelock.expect("both can be polite for ever");
+    let after = |rounds: usize| {
+        let choices = [&choices[..lap], &choices[lap..].repeat(rounds)].concat();
+        let host = VirtualHost::new();
+        let captured = host.captured();
+        let mut machine = program::machine(Config::default(), Box::new(host)).expect("there is room");
+        program::begin(&mut machine, &program).expect("it begins");
+        machine.follow_to(&settings, &choices, &mut |_| {});
+        machine.flush();
+        captured.output()
+    };
+    let [one, two, three] = [1, 2, 3].map(after);
+    let round = two.len() - one.len();
+    assert!(round > 0 && three.len() - two.len() == round, "{one} {two} {three}");
+    // Who waits in turn for what another task will do goes round only as long as the other one has no turn.
+    let patient = "(defvar *stop* nil) (spawn (setq *stop* t)) (loop until *stop* do (sleep 0))";
+    // And who asks for luck has it at some time.
+    for text in [patient, "(loop (when (choose nil t) (return)) (sleep 0))"] {
+        let found = explore(&compile(text), &settings).expect("it runs");
+        assert!(found.has_cycle && found.livelock.is_none() && found.endless.is_none(), "{text}: {found:?}");
+    }
 }

@@ -7,7 +7,7 @@
 use core::time::Duration;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 
@@ -51,12 +51,16 @@ impl Claims {
 /// Those who run the parts of a search.
 pub(super) trait Crew<T, E> {
     /// Runs on from each of these places, and returns what the runs have come by, in the same order. Where
-    /// one comes to what another one has claimed, it ends. Stops all when `goes_on` is false.
+    /// one comes to what another one has claimed, it ends. Stops all when `goes_on` is false, which is told
+    /// the number of new states that the batch has come to so far.
     ///
     /// # Errors
     /// That with which a machine could not be begun.
-    fn run(&mut self, batch: Vec<RunPlace>, goes_on: &mut dyn FnMut() -> bool)
-    -> Result<Vec<RunTrace<T>>, E>;
+    fn run(
+        &mut self,
+        batch: Vec<RunPlace>,
+        goes_on: &mut dyn FnMut(usize) -> bool,
+    ) -> Result<Vec<RunTrace<T>>, E>;
 }
 
 /// Returns what the search knows, which nobody changes now.
@@ -80,14 +84,19 @@ impl<S: Subject> Crew<S::Ending, S::Error> for LoneCrew<'_, S> {
     fn run(
         &mut self,
         batch: Vec<RunPlace>,
-        goes_on: &mut dyn FnMut() -> bool,
+        goes_on: &mut dyn FnMut(usize) -> bool,
     ) -> Result<Vec<RunTrace<S::Ending>>, S::Error> {
+        let mut states = 0;
+        let mut goes_on = || {
+            states += 1;
+            goes_on(states)
+        };
         let search = read(self.search);
         self.tracer.settle(&search);
         let claims = Claims::default();
         let mut traces = Vec::with_capacity(batch.len());
         for (place, number) in batch.into_iter().zip(0..) {
-            traces.push(self.tracer.run(&search, place, (number, &claims), goes_on)?);
+            traces.push(self.tracer.run(&search, place, (number, &claims), &mut goes_on)?);
         }
         Ok(traces)
     }
@@ -99,48 +108,52 @@ struct SharedBatch {
     /// Which of them somebody has taken.
     taken: Vec<AtomicBool>,
     claims: Claims,
+    /// Number of new states that its runs have come to.
+    states: AtomicUsize,
 }
 
 impl SharedBatch {
-    /// Takes a place for oneself: the first one of which `is_near` is true, or else the last one. Returns its
-    /// number; `None` if all are taken.
-    fn take(&self, is_near: impl Fn(RunPlace) -> bool) -> Option<usize> {
-        let is_free = |&number: &usize| !self.taken[number].load(Ordering::Relaxed);
-        loop {
-            let mut free = (0..self.places.len()).filter(is_free);
-            let near = free.find(|&number| is_near(self.places[number]));
-            let number = near.or_else(|| (0..self.places.len()).rev().find(is_free))?;
-            if !self.taken[number].swap(true, Ordering::Relaxed) {
-                return Some(number);
-            }
-        }
+    /// Returns the numbers of the places in the order in which to take them: first those of which `is_near`
+    /// is true, then the others from the last one on.
+    fn order(&self, is_near: impl Fn(RunPlace) -> bool) -> Vec<usize> {
+        let (mut order, far): (Vec<usize>, Vec<usize>) =
+            (0..self.places.len()).partition(|&number| is_near(self.places[number]));
+        order.extend(far.into_iter().rev());
+        order
+    }
+
+    /// Takes a place for oneself. Returns whether nobody had.
+    fn take(&self, number: usize) -> bool {
+        !self.taken[number].swap(true, Ordering::Relaxed)
     }
 }
 
-/// What a thread tells.
-enum Told<T, E> {
-    /// What a run has come by, and its place in the batch.
-    Run(usize, RunTrace<T>),
-    /// A machine could not be begun.
-    Failed(E),
-    /// Nothing is left to be taken of this batch.
-    Idle,
+/// A thread's part of a batch: what its runs have come by, with their places in the batch, and with what a
+/// machine could not be begun.
+struct BatchPart<T, E> {
+    traces: Vec<(usize, RunTrace<T>)>,
+    failed: Option<E>,
 }
 
-/// Tells that a thread is idle when it goes, also if the thread panics.
-struct TellsIdle<'a, T, E>(&'a Sender<Told<T, E>>);
+/// A part that is told when nothing is left to be taken of the batch, also if the thread panics. It is told
+/// as a whole: who takes it in sleeps meanwhile, and leaves the processors to the threads.
+struct TellsAtEnd<'a, T, E> {
+    part: BatchPart<T, E>,
+    tell: &'a Sender<BatchPart<T, E>>,
+}
 
-impl<T, E> Drop for TellsIdle<'_, T, E> {
+impl<T, E> Drop for TellsAtEnd<'_, T, E> {
     fn drop(&mut self) {
+        let traces = std::mem::take(&mut self.part.traces);
         // Nobody listens any more once the search is over.
-        _ = self.0.send(Told::Idle);
+        _ = self.tell.send(BatchPart { traces, failed: self.part.failed.take() });
     }
 }
 
 /// Several threads.
 pub(super) struct ThreadCrew<'a, T, E> {
     members: Vec<Sender<Arc<SharedBatch>>>,
-    told: Receiver<Told<T, E>>,
+    told: Receiver<BatchPart<T, E>>,
     /// Whether all are to stop.
     stop: &'a AtomicBool,
 }
@@ -165,8 +178,9 @@ impl<'a, T: Send + 'a, E: Send + 'a> ThreadCrew<'a, T, E> {
             works.push(Box::new(move || {
                 let mut tracer = Tracer::new(settings, settings.memory / jobs, subject());
                 for batch in orders {
-                    let _idle = TellsIdle(&tell);
-                    work(&mut tracer, &read(search), &batch, stop, &tell);
+                    let part = BatchPart { traces: Vec::new(), failed: None };
+                    let mut told = TellsAtEnd { part, tell: &tell };
+                    work(&mut tracer, &read(search), &batch, stop, &mut told.part);
                 }
             }));
             members.push(order);
@@ -181,15 +195,25 @@ fn work<S: Subject>(
     search: &Search,
     batch: &SharedBatch,
     stop: &AtomicBool,
-    tell: &Sender<Told<S::Ending, S::Error>>,
+    part: &mut BatchPart<S::Ending, S::Error>,
 ) {
     tracer.settle(search);
-    while let Some(number) = batch.take(|place| tracer.is_near(search, place)) {
-        let mut goes_on = || !stop.load(Ordering::Relaxed);
-        let ran = tracer.run(search, batch.places[number], (number, &batch.claims), &mut goes_on);
-        let told = ran.map_or_else(Told::Failed, |trace| Told::Run(number, trace));
-        if tell.send(told).is_err() {
-            return;
+    for number in batch.order(|place| tracer.is_near(search, place)) {
+        if !batch.take(number) {
+            continue;
+        }
+        let mut goes_on = || {
+            batch.states.fetch_add(1, Ordering::Relaxed);
+            !stop.load(Ordering::Relaxed)
+        };
+        match tracer.run(search, batch.places[number], (number, &batch.claims), &mut goes_on) {
+            Ok(trace) => part.traces.push((number, trace)),
+            Err(error) => {
+                // The others will not be able to, either.
+                part.failed = Some(error);
+                stop.store(true, Ordering::Relaxed);
+                return;
+            }
         }
     }
 }
@@ -198,11 +222,16 @@ impl<T: Send, E: Send> Crew<T, E> for ThreadCrew<'_, T, E> {
     fn run(
         &mut self,
         batch: Vec<RunPlace>,
-        goes_on: &mut dyn FnMut() -> bool,
+        goes_on: &mut dyn FnMut(usize) -> bool,
     ) -> Result<Vec<RunTrace<T>>, E> {
         let taken = batch.iter().map(|_| AtomicBool::new(false)).collect();
         let count = batch.len();
-        let batch = Arc::new(SharedBatch { places: batch, taken, claims: Claims::default() });
+        let batch = Arc::new(SharedBatch {
+            places: batch,
+            taken,
+            claims: Claims::default(),
+            states: AtomicUsize::new(0),
+        });
         let mut working = 0;
         for member in &self.members {
             working += usize::from(member.send(batch.clone()).is_ok());
@@ -211,17 +240,16 @@ impl<T: Send, E: Send> Crew<T, E> for ThreadCrew<'_, T, E> {
         let mut failed = None;
         while working > 0 {
             match self.told.recv_timeout(Duration::from_millis(50)) {
-                Ok(Told::Run(number, trace)) => traces[number] = Some(trace),
-                Ok(Told::Failed(error)) => {
-                    self.stop.store(true, Ordering::Relaxed);
-                    failed = failed.or(Some(error));
+                Ok(part) => {
+                    working -= 1;
+                    failed = failed.or(part.failed);
+                    part.traces.into_iter().for_each(|(number, trace)| traces[number] = Some(trace));
                 }
-                Ok(Told::Idle) => working -= 1,
                 Err(RecvTimeoutError::Timeout) => {}
                 // A thread has panicked, which the scope tells.
                 Err(RecvTimeoutError::Disconnected) => break,
             }
-            if !goes_on() {
+            if !goes_on(batch.states.load(Ordering::Relaxed)) {
                 self.stop.store(true, Ordering::Relaxed);
             }
         }

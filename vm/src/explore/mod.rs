@@ -9,6 +9,7 @@
 //! trace         one run of the search, and taking in what it has come by
 //! crew          this thread, or several, among which the runs are divided
 //! keep          returning to places of that tree
+//! livelock      ways round that are fair to all
 //! ```
 //!
 //! **Points.** A task is assumed to run undisturbed from one *point* to the next. It stands at a point just
@@ -51,6 +52,7 @@ mod crew;
 mod fingerprint;
 mod keep;
 mod live;
+mod livelock;
 mod point;
 mod search;
 #[cfg(test)]
@@ -142,10 +144,23 @@ pub struct Exploration<T> {
     pub endings: Vec<ExploredEnding<T>>,
     /// Choices that lead to a state from which no schedule leads to an end, if there is one.
     pub endless: Option<Vec<u32>>,
+    /// A schedule that goes on for ever though it is fair to all tasks, beside those that lead to a state of
+    /// `endless`, if there is one.
+    pub livelock: Option<Livelock>,
     /// Whether a schedule returns to a state: then it can go on for ever, if only by treating tasks unfairly.
     pub has_cycle: bool,
     /// What kept the search from trying everything, if anything did.
     pub limit: Option<SearchLimit>,
+}
+
+/// A schedule that returns to a state on a way that is fair: each task that could go on all the way has gone
+/// on, and time has passed if it could.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Livelock {
+    /// Choices that lead to the state, and from there back to it.
+    pub choices: Vec<u32>,
+    /// Number of the first choice on the way back.
+    pub lap: usize,
 }
 
 /// What keeps a search from trying everything.
@@ -304,7 +319,9 @@ fn search_by<T: PartialEq + Clone, E>(
         }
         let places: Vec<RunPlace> =
             batch.into_iter().zip(runs as u64..).map(|(node, serial)| RunPlace { node, serial }).collect();
-        let mut traces = crew.run(places.clone(), &mut || goes_on(&progress))?;
+        let mut traces = crew.run(places.clone(), &mut |more| {
+            goes_on(&SearchProgress { states: progress.states + more, ..progress })
+        })?;
         let search = &mut *write();
         search.settled();
         for (number, &RunPlace { node, .. }) in places.iter().enumerate() {
@@ -344,7 +361,15 @@ fn search_by<T: PartialEq + Clone, E>(
         }
     }
     let search = write();
-    let endless = if limit.is_none() { search.endless() } else { None };
+    let ends = if limit.is_none() { search.ending() } else { vec![true; search.places.len()] };
+    let stuck = ends.iter().position(|ends| !ends);
+    let endless = stuck.map(|state| search.choices(search.places[state]));
     let (states, has_cycle) = (search.states.len(), search.has_cycle());
-    Ok(Exploration { states, runs, endings, endless, has_cycle, limit })
+    let has_timers = settings.timers == TimerGrain::Any;
+    let lap = if has_cycle { search.fair_lap(has_timers, |state| !ends[state as usize]) } else { None };
+    let livelock = lap.map(|lap| {
+        let before = search.choices(search.places[lap.state as usize]);
+        Livelock { lap: before.len(), choices: [before, lap.choices].concat() }
+    });
+    Ok(Exploration { states, runs, endings, endless, livelock, has_cycle, limit })
 }

@@ -386,6 +386,17 @@ fn runnable_tasks(vm: &Vm) -> impl Iterator<Item = (TaskNumber, TaskIndex)> + '_
     })
 }
 
+/// Returns the numbers of the tasks that have not ended, oldest first, and which of the first 63 can run.
+pub(super) fn living_tasks(vm: &Vm) -> (SmallVec<[TaskNumber; 16]>, u64) {
+    let living = vm.scheduler.tasks.iter().filter(|task| task.state != TaskState::Ended);
+    let mut tasks: SmallVec<[(TaskNumber, bool); 16]> =
+        living.map(|task| (task.number, task.state == TaskState::Runnable)).collect();
+    tasks.sort_unstable();
+    let able = tasks.iter().take(63).enumerate().filter(|(_, (_, is_able))| *is_able);
+    let able = able.fold(0, |able, (rank, _)| able | 1 << rank);
+    (tasks.into_iter().map(|(number, _)| number).collect(), able)
+}
+
 /// Most turns of a task that checks what always has to hold, in one state.
 const CHECK_TURNS: u32 = 1_000;
 

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use super::SearchProgress;
+use super::livelock::{FairLap, StateGraph, StateStep, StateTasks};
 
 /// A node in the tree of choices: its last choice, after those of its parent.
 #[derive(Clone, Copy, Debug)]
@@ -31,8 +32,10 @@ pub(super) struct Search {
     pub(super) states: HashMap<u128, u32>,
     /// Node from which each state was reached first.
     pub(super) places: Vec<u32>,
-    /// Steps, as pairs of the states before and after.
-    pub(super) steps: Vec<(u32, u32)>,
+    /// What is to be known of the tasks in each state.
+    pub(super) tasks: Vec<StateTasks>,
+    /// Steps between states.
+    pub(super) steps: Vec<StateStep>,
     /// States from which a step leads to the end.
     pub(super) last: Vec<u32>,
     /// Nodes at which other choices of the last batch's runs stand open, by run and step.
@@ -96,12 +99,13 @@ impl Search {
 
     /// Returns the number of the state with this fingerprint, and whether it is new; then it was reached
     /// first from this node.
-    pub(super) fn state(&mut self, fingerprint: u128, node: u32) -> (u32, bool) {
+    pub(super) fn state(&mut self, fingerprint: u128, node: u32, tasks: StateTasks) -> (u32, bool) {
         let next = self.places.len() as u32;
         match self.states.entry(fingerprint) {
             Entry::Occupied(known) => (*known.get(), false),
             Entry::Vacant(free) => {
                 self.places.push(node);
+                self.tasks.push(tasks);
                 (*free.insert(next), true)
             }
         }
@@ -110,9 +114,11 @@ impl Search {
     /// Returns the bytes that the search takes, about.
     pub(super) fn bytes(&self) -> usize {
         let open = self.open.iter().map(Vec::capacity).sum::<usize>();
-        let numbers = open + self.places.capacity() + self.last.capacity() + 2 * self.steps.capacity();
+        let numbers = open + self.places.capacity() + self.last.capacity();
         self.nodes.capacity() * size_of::<ChoiceNode>()
             + self.states.capacity() * (size_of::<(u128, u32)>() + 1)
+            + self.tasks.capacity() * size_of::<StateTasks>()
+            + self.steps.capacity() * size_of::<StateStep>()
             + numbers * size_of::<u32>()
     }
 
@@ -139,11 +145,11 @@ impl Search {
         choices
     }
 
-    /// Returns choices that lead to a state from which the end cannot be reached.
-    pub(super) fn endless(&self) -> Option<Vec<u32>> {
+    /// Returns of each state whether the end can be reached from it.
+    pub(super) fn ending(&self) -> Vec<bool> {
         let mut before = vec![Vec::new(); self.places.len()];
-        for &(from, to) in &self.steps {
-            before[to as usize].push(from);
+        for step in &self.steps {
+            before[step.to as usize].push(step.from);
         }
         let mut ends = vec![false; self.places.len()];
         let mut found = self.last.clone();
@@ -152,8 +158,12 @@ impl Search {
                 found.extend(&before[state as usize]);
             }
         }
-        let stuck = ends.iter().position(|ends| !ends)?;
-        Some(self.choices(self.places[stuck]))
+        ends
+    }
+
+    /// Returns a fair way round among the states of which `is_out` is false.
+    pub(super) fn fair_lap(&self, has_timers: bool, is_out: impl Fn(u32) -> bool) -> Option<FairLap> {
+        StateGraph::new(&self.tasks, &self.steps, has_timers, is_out).fair_lap()
     }
 
     /// Returns whether steps lead from a state back to it: whether states remain when those without a step to
@@ -161,9 +171,9 @@ impl Search {
     pub(super) fn has_cycle(&self) -> bool {
         let mut after = vec![Vec::new(); self.places.len()];
         let mut steps_to = vec![0_u32; self.places.len()];
-        for &(from, to) in &self.steps {
-            after[from as usize].push(to);
-            steps_to[to as usize] += 1;
+        for step in &self.steps {
+            after[step.from as usize].push(step.to);
+            steps_to[step.to as usize] += 1;
         }
         let mut free: Vec<u32> =
             (0..self.places.len() as u32).filter(|&state| steps_to[state as usize] == 0).collect();

@@ -1,13 +1,19 @@
 //! One run of a search: from a place of the tree to the end, or to a state that is known already.
 
+use smallvec::SmallVec;
+
 use super::Subject;
 use super::crew::{ClaimedStep, Claims, RunPlace};
 use super::keep::Keeper;
+use super::livelock::{NOBODY, StateStep, StateTasks, StepCause, TIME};
+use super::point::{PointRun, Runnable, living_tasks};
 use super::search::{ROOT, Search};
 use super::{SearchLimit, Settings};
+use crate::task::TaskNumber;
+use crate::vm::Vm;
 
 /// Bytes that a step of a run takes until the search has taken it in, about.
-const STEP_BYTES: usize = 64;
+const STEP_BYTES: usize = 80;
 
 /// A state that a run has come to.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +26,55 @@ pub(super) struct TraceStep {
     pub(super) has_last: bool,
     /// Whether the program itself chooses.
     pub(super) has_ways: bool,
+    /// The tasks there.
+    pub(super) tasks: StateTasks,
+    /// What led to it.
+    pub(super) cause: StepCause,
+}
+
+/// The tasks at a point, and the choice there.
+struct TasksAtPoint {
+    /// The tasks that are there, oldest first.
+    numbers: SmallVec<[TaskNumber; 16]>,
+    /// Whether the program itself chooses.
+    has_ways: bool,
+    /// Whether the choice was to let time pass.
+    passes_time: bool,
+    choice: u32,
+}
+
+impl TasksAtPoint {
+    fn of(vm: &mut Vm, run: PointRun, runnable: Runnable<'_>) -> (TasksAtPoint, StateTasks) {
+        let (numbers, mut able) = living_tasks(vm);
+        if vm.scheduler.first_timer().is_some() {
+            able |= 1 << TIME;
+        }
+        let last = rank(&numbers, run.last());
+        let ways = runnable.ways.map_or(0, |ways| u16::try_from(ways).unwrap_or(u16::MAX));
+        let has_ways = runnable.ways.is_some();
+        (TasksAtPoint { numbers, has_ways, passes_time: false, choice: 0 }, StateTasks { able, ways, last })
+    }
+
+    /// Notes the choice that is made here.
+    fn choose(&mut self, runnable: Runnable<'_>, choice: u32) {
+        let is_last = choice as usize == runnable.tasks.len();
+        (self.passes_time, self.choice) = (!self.has_ways && runnable.has_timer && is_last, choice);
+    }
+
+    /// Returns what has led from here to another point, at which these tasks are, after this one has run.
+    fn cause(&self, numbers: &[TaskNumber], ran: TaskNumber) -> StepCause {
+        StepCause {
+            ran: if self.passes_time { TIME } else { rank(&self.numbers, ran) },
+            way: if self.has_ways { u16::try_from(self.choice).unwrap_or(u16::MAX) } else { 0 },
+            keeps_tasks: self.numbers[..] == *numbers && numbers.len() <= usize::from(TIME),
+        }
+    }
+}
+
+/// Returns the rank of a task among others.
+fn rank(numbers: &[TaskNumber], task: TaskNumber) -> u8 {
+    let rank = numbers.binary_search(&task).ok().and_then(|rank| u8::try_from(rank).ok());
+    rank.filter(|&rank| rank < TIME).unwrap_or(NOBODY)
 }
 
 /// How a run of the search has ended.
@@ -85,6 +140,7 @@ impl<'a, S: Subject> Tracer<'a, S> {
         let mut given = choices.into_iter();
         let mut steps: Vec<TraceStep> = Vec::new();
         let mut end = TraceEnd::Known;
+        let mut before: Option<TasksAtPoint> = None;
         let most = settings.states.min(settings.memory / STEP_BYTES);
         let outcome = run.go_on(&mut machine, u64::MAX, &mut |vm, run, runnable| {
             if given.len() == 1 && runnable.count() > 1 {
@@ -93,6 +149,11 @@ impl<'a, S: Subject> Tracer<'a, S> {
             if runnable.count() > 1
                 && let Some(choice) = given.next()
             {
+                if given.len() == 0 {
+                    let (mut here, _) = TasksAtPoint::of(vm, run, runnable);
+                    here.choose(runnable, choice);
+                    before = Some(here);
+                }
                 return Some(choice);
             }
             if given.len() > 0 {
@@ -100,7 +161,11 @@ impl<'a, S: Subject> Tracer<'a, S> {
             }
             let state = keeper.fingerprints.of(vm);
             let (count, has_last) = (runnable.count(), runnable.has_last);
-            steps.push(TraceStep { state, count, has_last, has_ways: runnable.ways.is_some() });
+            let (here, tasks) = TasksAtPoint::of(vm, run, runnable);
+            let unknown = StepCause { ran: NOBODY, way: 0, keeps_tasks: false };
+            let cause = before.as_ref().map_or(unknown, |before| before.cause(&here.numbers, run.last()));
+            before = Some(here);
+            steps.push(TraceStep { state, count, has_last, has_ways: runnable.ways.is_some(), tasks, cause });
             end = if search.states.contains_key(&state) {
                 TraceEnd::Known
             } else if let Some(step) = claims.claim((state, run.last()), (number, steps.len() - 1)) {
@@ -161,9 +226,9 @@ impl Merging<'_> {
         (serial, steps, first): (u64, &[TraceStep], usize),
     ) -> Merged {
         for (step, at) in steps.iter().zip(0..).skip(first) {
-            let (state, is_new) = search.state(step.state, place.node);
-            if let Some(before) = place.before {
-                search.steps.push((before, state));
+            let (state, is_new) = search.state(step.state, place.node, step.tasks);
+            if let Some(from) = place.before {
+                search.steps.push(StateStep { from, to: state, cause: step.cause });
             }
             if !is_new {
                 return Merged::Known;
