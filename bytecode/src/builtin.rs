@@ -1228,12 +1228,8 @@ macro_rules! for_each_builtin {
             /// `NIL` if they are not `length` characters any more. The last string may be longer than what is
             /// in it.
             TakeGathered = stream::take_gathered, internal "%TAKE-GATHERED" ("stream length");
-            /// A stream that reads a text file.
-            OpenInput = stream::open_input, internal "%OPEN-INPUT" ("path");
-            /// A stream that writes a text file: 0 replaces it, 1 appends to it, 2 fails if there is one.
-            OpenOutput = stream::open_output, internal "%OPEN-OUTPUT" ("path mode");
-            /// Closes a stream; with `abort`, what it has gathered is dropped. Whether it was open.
-            CloseStream = stream::close, internal "%CLOSE" ("stream abort");
+            /// Closes a stream; what a channel has gathered is dropped. Whether it was open.
+            CloseStream = stream::close, internal "%CLOSE" ("stream");
             /// The text of a file.
             FileText = stream::file_text, internal "%FILE-TEXT" ("path &optional is-module");
             /// Whether there is a file of this name, which is to be read; with `T`, as a module, with

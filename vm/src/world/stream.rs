@@ -17,22 +17,20 @@ pub(crate) mod slot {
     pub(crate) const END: usize = 2;
     /// Characters written since the last line end.
     pub(crate) const COLUMN: usize = 3;
-    /// Name of the file. For a channel what reads and writes for it.
-    pub(crate) const NAME: usize = 4;
+    /// For a channel what reads and writes for it.
+    pub(crate) const HANDLER: usize = 4;
     /// Whether the stream is open.
     pub(crate) const OPEN: usize = 5;
-    /// Mode in which the next block is written to the file: number of a `WriteMode`. For a channel 1 if
-    /// nothing comes after what it has to read; for its output 1, since that is bounded.
-    pub(crate) const MODE: usize = 6;
+    /// For a channel 1 if nothing comes after what it has to read; for its output 1, since that is bounded.
+    pub(crate) const BOUND: usize = 6;
     /// List of the full strings gathered before the buffer, the last first. For a channel what it is for: 1
     /// for reading, 2 for writing, otherwise both.
     pub(crate) const FULL: usize = 7;
     /// Number of characters in the full strings. For a channel of those that were read and are not in the
     /// buffer any more.
     pub(crate) const BEFORE: usize = 8;
-    /// Path that is written to: the one that was permitted. For a channel the string stream that gathers its
-    /// output.
-    pub(crate) const PATH: usize = 9;
+    /// For a channel the string stream that gathers its output.
+    pub(crate) const OUTPUT: usize = 9;
     /// For a channel the name of the file that is behind it.
     pub(crate) const FILE: usize = 10;
     /// Number of slots.
@@ -46,14 +44,13 @@ pub(crate) enum StreamKind {
     StandardInput = 0,
     StandardOutput = 1,
     StandardError = 2,
-    /// A string, or the text of a file that is read as a whole.
+    /// A string.
     StringInput = 3,
     StringOutput = 4,
-    FileOutput = 5,
     /// Anything else: the operations are in ESL, over the object in the buffer's slot.
-    Custom = 6,
+    Custom = 5,
     /// What functions of the library read from and write to, such as a socket or a file.
-    Channel = 7,
+    Channel = 6,
 }
 
 impl StreamKind {
@@ -76,8 +73,7 @@ impl StreamKind {
             2 => StreamKind::StandardError,
             3 => StreamKind::StringInput,
             4 => StreamKind::StringOutput,
-            5 => StreamKind::FileOutput,
-            6 => StreamKind::Custom,
+            5 => StreamKind::Custom,
             _ => StreamKind::Channel,
         })
     }
@@ -100,7 +96,7 @@ pub(crate) fn make_stream(
     slots[slot::END] = Value::index(end);
     slots[slot::COLUMN] = Value::small(0);
     slots[slot::OPEN] = Value::T;
-    slots[slot::MODE] = Value::small(0);
+    slots[slot::BOUND] = Value::small(0);
     slots[slot::BEFORE] = Value::small(0);
     heap.alloc_record(Kind::Stream, 0, kind as u16, &slots)
 }

@@ -16,7 +16,7 @@ use super::{BLOCK, FIRST_BUFFER, StreamUse, set_stream_slot, stream_index, strea
 
 /// Returns whether more may be supplied to a stream.
 pub(super) fn may_go_on(heap: &Heap, stream: Value, kind: StreamKind) -> bool {
-    kind == StreamKind::Channel && stream_index(heap, stream, slot::MODE) == 0
+    kind == StreamKind::Channel && stream_index(heap, stream, slot::BOUND) == 0
 }
 
 /// Returns whether a channel is for a use.
@@ -30,7 +30,7 @@ pub(super) fn is_for(heap: &Heap, channel: Value, purpose: StreamUse) -> bool {
 
 /// Returns whether a string stream gathers the output of a channel.
 pub(super) fn is_bounded(heap: &Heap, stream: Value) -> bool {
-    stream_index(heap, stream, slot::MODE) == 1
+    stream_index(heap, stream, slot::BOUND) == 1
 }
 
 /// Returns the stream that gathers the output of a channel.
@@ -38,7 +38,7 @@ pub(super) fn is_bounded(heap: &Heap, stream: Value) -> bool {
 /// # Errors
 /// [`Exit::Slowly`] if it has to be written first.
 pub(super) fn output_to_write(vm: &mut Vm, channel: Value) -> Result<(Value, StreamKind), Exit> {
-    let output = stream_slot(&vm.heap, channel, slot::PATH);
+    let output = stream_slot(&vm.heap, channel, slot::OUTPUT);
     let gathered =
         stream_index(&vm.heap, output, slot::BEFORE) + stream_index(&vm.heap, output, slot::POSITION);
     if gathered >= BLOCK { Err(Exit::Slowly) } else { Ok((output, StreamKind::StringOutput)) }
@@ -56,11 +56,11 @@ pub(in crate::builtins) fn make_channel(vm: &mut Vm, arguments: &[Value]) -> Out
     let [handler, file, direction] = exactly(arguments);
     let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
     let output = make_stream(&mut vm.heap, StreamKind::StringOutput, buffer, 0, 0)?;
-    set_stream_slot(&mut vm.heap, output, slot::MODE, Value::small(1));
+    set_stream_slot(&mut vm.heap, output, slot::BOUND, Value::small(1));
     let empty = vm.heap.alloc_string(&[])?;
     let channel = make_stream(&mut vm.heap, StreamKind::Channel, empty, 0, 0)?;
-    set_stream_slot(&mut vm.heap, channel, slot::NAME, handler);
-    set_stream_slot(&mut vm.heap, channel, slot::PATH, output);
+    set_stream_slot(&mut vm.heap, channel, slot::HANDLER, handler);
+    set_stream_slot(&mut vm.heap, channel, slot::OUTPUT, output);
     set_stream_slot(&mut vm.heap, channel, slot::FILE, file);
     set_stream_slot(&mut vm.heap, channel, slot::FULL, direction);
     Ok(channel)
@@ -69,7 +69,7 @@ pub(in crate::builtins) fn make_channel(vm: &mut Vm, arguments: &[Value]) -> Out
 /// `(%channel-handler object)`
 pub(in crate::builtins) fn channel_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
-        Some(StreamKind::Channel) => Ok(stream_slot(&vm.heap, arguments[0], slot::NAME)),
+        Some(StreamKind::Channel) => Ok(stream_slot(&vm.heap, arguments[0], slot::HANDLER)),
         _ => Ok(Value::NIL),
     }
 }
@@ -77,7 +77,7 @@ pub(in crate::builtins) fn channel_handler(vm: &mut Vm, arguments: &[Value]) -> 
 /// `(%channel-output channel)`
 pub(in crate::builtins) fn channel_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let channel = expect_channel(vm, arguments[0])?;
-    Ok(stream_slot(&vm.heap, channel, slot::PATH))
+    Ok(stream_slot(&vm.heap, channel, slot::OUTPUT))
 }
 
 /// `(%channel-state channel)`
@@ -113,7 +113,7 @@ pub(in crate::builtins) fn supply_channel(vm: &mut Vm, arguments: &[Value]) -> O
     let [channel, text] = exactly(arguments);
     let channel = expect_channel(vm, channel)?;
     if text.is_nil() {
-        set_stream_slot(&mut vm.heap, channel, slot::MODE, Value::small(1));
+        set_stream_slot(&mut vm.heap, channel, slot::BOUND, Value::small(1));
         return Ok(Value::NIL);
     }
     let Some(more) = vm.heap.string(text) else { return vm.exchange.type_error(text, "SIMPLE-STRING") };
@@ -132,6 +132,6 @@ pub(in crate::builtins) fn supply_channel(vm: &mut Vm, arguments: &[Value]) -> O
     set_stream_slot(&mut vm.heap, channel, slot::POSITION, Value::index(position));
     set_stream_slot(&mut vm.heap, channel, slot::END, Value::index(length));
     set_stream_slot(&mut vm.heap, channel, slot::BEFORE, Value::index(before));
-    set_stream_slot(&mut vm.heap, channel, slot::MODE, Value::small(0));
+    set_stream_slot(&mut vm.heap, channel, slot::BOUND, Value::small(0));
     Ok(Value::T)
 }

@@ -1,4 +1,4 @@
-//! Files: their streams, their texts and bytes, whether they are there.
+//! Files of the host as a whole: their texts and bytes, whether they are there.
 
 use crate::builtins::array::{ArrayElements, vector_elements};
 use crate::builtins::expect::{exactly, optional};
@@ -9,51 +9,6 @@ use crate::host::{Host, HostError, Right, WriteMode};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::stream::{StreamKind, make_stream, slot};
-
-use super::{FIRST_BUFFER, set_stream_slot};
-
-pub(in crate::builtins) fn open_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = text_of(&vm.heap, arguments[0]) else {
-        return vm.exchange.type_error(arguments[0], "STRING");
-    };
-    let buffer = file_text(vm, &arguments[..1])?;
-    let length = vm.heap.string(buffer).map_or(0, <[u32]>::len);
-    let stream = make_stream(&mut vm.heap, StreamKind::StringInput, buffer, 0, length)?;
-    let name = vm.heap.alloc_str(&path)?;
-    set_stream_slot(&mut vm.heap, stream, slot::NAME, name);
-    Ok(stream)
-}
-
-pub(in crate::builtins) fn open_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [path, mode] = exactly(arguments);
-    let Some(path) = text_of(&vm.heap, path) else { return vm.exchange.type_error(path, "STRING") };
-    let mode = vm.exchange.index_below(mode, 3)?;
-    let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
-    let stream = make_stream(&mut vm.heap, StreamKind::FileOutput, buffer, 0, 0)?;
-    let name = vm.heap.alloc_str(&path)?;
-    set_stream_slot(&mut vm.heap, stream, slot::NAME, name);
-    let permitted = demand(vm, Right::Write, &path)?;
-    let target = vm.heap.alloc_str(&permitted)?;
-    set_stream_slot(&mut vm.heap, stream, slot::PATH, target);
-    // Nothing is written at once, so that a file that cannot be made fails here.
-    match vm.outside.host.write_file(&permitted, &[], write_mode(mode)) {
-        Ok(()) => {
-            set_stream_slot(&mut vm.heap, stream, slot::MODE, Value::small(1));
-            Ok(stream)
-        }
-        Err(error) => file_error(&mut vm.exchange, "written", &path, &error),
-    }
-}
-
-/// What the mode of a stream says of the file.
-pub(super) fn write_mode(mode: usize) -> WriteMode {
-    match mode {
-        0 => WriteMode::Replace,
-        1 => WriteMode::Append,
-        _ => WriteMode::Create,
-    }
-}
 
 /// Returns the right that is needed for the file of the first argument: to read it, as a module if the second
 /// one is `T`, to write it if it is anything else.
@@ -90,6 +45,15 @@ pub(in crate::builtins) fn file_bytes(vm: &mut Vm, arguments: &[Value]) -> Outco
             Ok(vm.heap.alloc_bytes(&bytes)?)
         }
         Err(error) => file_error(&mut vm.exchange, "read", &path, &error),
+    }
+}
+
+/// Returns the mode of a number.
+fn write_mode(mode: usize) -> WriteMode {
+    match mode {
+        0 => WriteMode::Replace,
+        1 => WriteMode::Append,
+        _ => WriteMode::Create,
     }
 }
 

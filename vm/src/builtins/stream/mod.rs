@@ -1,10 +1,9 @@
-//! Streams: the standard ones, and those that read from or write to a string or a text file.
+//! Streams: the standard ones, those that read from or write to a string, and channels, for which functions
+//! of the library read and write, such as those of files and sockets.
 //!
 //! A Stream is a record ([`crate::world::stream`]). The operations of a custom stream are in ESL: its
-//! builtins leave it to their twins. A file is read as a whole when it is opened; output to a file is
-//! gathered, and written in blocks and when the stream is closed. Output to a string is gathered in strings
-//! that never grow, so that the millionth character takes as long as the first. Every output stream knows its
-//! column.
+//! builtins leave it to their twins. Output to a string is gathered in strings that never grow, so that the
+//! millionth character takes as long as the first. Every output stream knows its column.
 
 use crate::builtins::COPY_LIMIT;
 use crate::builtins::array::{ArrayElements, vector_elements};
@@ -33,10 +32,7 @@ mod write;
 pub(super) use channel::{
     channel_handler, channel_output, channel_piece, channel_state, make_channel, supply_channel,
 };
-pub(super) use file::{
-    delete_file, file_bytes, file_error, file_exists_p, file_text, open_input, open_output, right_to,
-    write_bytes,
-};
+pub(super) use file::{delete_file, file_bytes, file_error, file_exists_p, file_text, right_to, write_bytes};
 pub(super) use read::{listen, peek_char, read_char, read_char_no_hang, read_line, unread_char};
 pub(super) use text::{
     gathered_length, get_output_stream_string, make_string_input, make_string_output, read_from_copy,
@@ -44,7 +40,7 @@ pub(super) use text::{
 };
 pub(super) use write::{finish_output, fresh_line, terpri, write_char, write_string};
 
-/// Characters that a file's stream gathers before it writes them.
+/// Characters that a channel gathers before its function has to write them.
 const BLOCK: usize = 1 << 15;
 /// Characters that a string stream gathers in one string, but for what is written at once.
 const GATHERED: usize = 1 << 13;
@@ -207,7 +203,7 @@ fn write_characters(vm: &mut Vm, stream: Value, kind: StreamKind, characters: &[
             let column = column_after(stream_index(&vm.heap, stream, slot::COLUMN), characters);
             set_stream_slot(&mut vm.heap, stream, slot::POSITION, Value::index(end));
             set_stream_slot(&mut vm.heap, stream, slot::COLUMN, Value::index(column));
-            if kind == StreamKind::FileOutput && end >= BLOCK { write_out(vm, stream) } else { Ok(()) }
+            Ok(())
         }
     }
 }
@@ -251,24 +247,6 @@ fn gather(vm: &mut Vm, stream: Value, kind: StreamKind, characters: &[u32]) -> R
     set_stream_slot(&mut vm.heap, stream, slot::BUFFER, larger);
     vm.exchange.charge_elements(position);
     Ok(end)
-}
-
-/// Writes what a file's stream has gathered.
-fn write_out(vm: &mut Vm, stream: Value) -> Result<(), Exit> {
-    let position = stream_index(&vm.heap, stream, slot::POSITION);
-    let buffer = stream_slot(&vm.heap, stream, slot::BUFFER);
-    let mut bytes = Vec::new();
-    encode(vm.heap.string(buffer).map_or(&[], |all| &all[..position]), &mut bytes);
-    let mode = file::write_mode(stream_index(&vm.heap, stream, slot::MODE));
-    let path = text_of(&vm.heap, stream_slot(&vm.heap, stream, slot::PATH)).unwrap_or_default();
-    // What cannot be written is not tried again: the next block would fail too, and closing has to
-    // succeed.
-    set_stream_slot(&mut vm.heap, stream, slot::POSITION, Value::small(0));
-    set_stream_slot(&mut vm.heap, stream, slot::MODE, Value::small(1));
-    match vm.outside.host.write_file(&path, &bytes, mode) {
-        Ok(()) => Ok(()),
-        Err(error) => vm.exchange.raise(Raised::Stream(stream, format!("it cannot be written: {error}"))),
-    }
 }
 
 /// Has the running task wait until a standard stream has room. A task that must not wait writes what there is
@@ -414,7 +392,7 @@ pub(super) fn standard_stream(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [stream, abort] = exactly(arguments);
+    let [stream] = exactly(arguments);
     let Some(kind) = StreamKind::of(&vm.heap, stream) else {
         return vm.exchange.type_error(stream, "STREAM");
     };
@@ -425,10 +403,6 @@ pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         StreamKind::StandardInput | StreamKind::StandardOutput | StreamKind::StandardError => {
             finish_standard(vm)?;
             return Ok(Value::T);
-        }
-        StreamKind::FileOutput if abort.is_nil() => {
-            set_stream_slot(&mut vm.heap, stream, slot::OPEN, Value::NIL);
-            write_out(vm, stream)?;
         }
         _ => set_stream_slot(&mut vm.heap, stream, slot::OPEN, Value::NIL),
     }
@@ -506,16 +480,13 @@ pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(kind) = StreamKind::of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STREAM");
     };
-    let name = match kind {
-        StreamKind::Channel => stream_slot(&vm.heap, arguments[0], slot::FILE),
-        _ => stream_slot(&vm.heap, arguments[0], slot::NAME),
-    };
+    let name = stream_slot(&vm.heap, arguments[0], slot::FILE);
     let kind = match kind {
         StreamKind::StandardInput | StreamKind::StandardOutput | StreamKind::StandardError => "STANDARD",
         StreamKind::Custom => "CUSTOM",
-        StreamKind::StringInput | StreamKind::StringOutput if name.is_nil() => "STRING",
+        StreamKind::StringInput | StreamKind::StringOutput => "STRING",
         StreamKind::Channel if name.is_nil() => "CHANNEL",
-        _ => "FILE",
+        StreamKind::Channel => "FILE",
     };
     let kind = vm.world.keyword(&mut vm.heap, kind)?;
     vm.give_values(&[kind, name])

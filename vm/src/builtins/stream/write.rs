@@ -7,7 +7,7 @@ use crate::vm::Vm;
 
 use super::{
     StreamKind, channel, check_output, column_of, designated_stream, few_characters, finish_standard,
-    write_characters, write_out,
+    write_characters,
 };
 
 /// `(write-char character &optional stream)`
@@ -55,7 +55,6 @@ pub(in crate::builtins) fn finish_output(vm: &mut Vm, arguments: &[Value]) -> Ou
             check_output(vm)?;
         }
         StreamKind::StandardError => finish_standard(vm)?,
-        StreamKind::FileOutput => write_out(vm, stream)?,
         StreamKind::StringOutput if channel::is_bounded(&vm.heap, stream) => return Err(Exit::Slowly),
         _ => {}
     }
