@@ -129,14 +129,8 @@ impl Translator<'_, '_> {
         }
         self.close_batch();
         let (done, wrong) = (self.block_with(types::F64), self.wrong());
-        let (doubles, others, fixnums, zeros) = (self.block(), self.block(), self.block(), self.cold_block());
-        let tag = self.b.ins().band_imm_s(word, 3);
-        let is_double = self.equals(tag, 3);
-        self.branch(is_double, doubles, others);
-        self.go_to(doubles);
-        let double = self.decode(word);
-        self.jump_with(done.0, double);
-        self.go_to(others);
+        let (others, fixnums, zeros) = (self.block(), self.block(), self.cold_block());
+        let tag = self.decode_or(word, done.0, others);
         self.branch(tag, zeros, fixnums);
         self.go_to(fixnums);
         let double = self.convert(word);

@@ -210,18 +210,25 @@ impl Translator<'_, '_> {
 
     /// Returns the double that a word is; what is none, or needs a box, goes to `otherwise`.
     pub(crate) fn double_of(&mut self, word: Ssa, otherwise: Block) -> Ssa {
-        let done = self.block_with(types::F64);
-        let (doubles, others) = (self.block(), self.cold_block());
+        let (done, others) = (self.block_with(types::F64), self.cold_block());
+        self.decode_or(word, done.0, others);
+        self.zero_or(word, done.0, otherwise);
+        self.go_to(done.0);
+        done.1
+    }
+
+    /// Goes to `done` with the double that a word is, unless it is none or has a constant of its own: then
+    /// to `others`, where the code goes on. Returns the tag of the word.
+    pub(crate) fn decode_or(&mut self, word: Ssa, done: Block, others: Block) -> Ssa {
+        let doubles = self.block();
         let tag = self.b.ins().band_imm_s(word, 3);
         let is_double = self.equals(tag, 3);
         self.branch(is_double, doubles, others);
         self.go_to(doubles);
         let double = self.decode(word);
-        self.jump_with(done.0, double);
+        self.jump_with(done, double);
         self.go_to(others);
-        self.zero_or(word, done.0, otherwise);
-        self.go_to(done.0);
-        done.1
+        tag
     }
 
     /// Jumps to `done` with the zero that a word is, or to `otherwise`.

@@ -59,14 +59,19 @@ pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(changed)
 }
 
-pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+/// Returns the name and the width of a property that is about to be made or dropped.
+fn property(vm: &mut Vm, arguments: &[Value]) -> Result<(Value, usize), Exit> {
     let [name, width] = exactly(arguments);
     vm.scheduler.point()?;
     prepare(vm)?;
     if !vm.world.is_symbol(&vm.heap, name) {
         return vm.exchange.type_error(name, "SYMBOL");
     }
-    let width = vm.exchange.count(width)?;
+    Ok((name, vm.exchange.count(width)?))
+}
+
+pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (name, width) = property(vm, arguments)?;
     let mut work = 0;
     let made = vm.database.define_property(&mut vm.heap, name, width, &mut work)?;
     vm.exchange.charge(4 * work);
@@ -74,13 +79,7 @@ pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn drop_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [name, width] = exactly(arguments);
-    vm.scheduler.point()?;
-    prepare(vm)?;
-    if !vm.world.is_symbol(&vm.heap, name) {
-        return vm.exchange.type_error(name, "SYMBOL");
-    }
-    let width = vm.exchange.count(width)?;
+    let (name, width) = property(vm, arguments)?;
     vm.database.drop_property(&mut vm.heap, name, width)?;
     Ok(name)
 }
