@@ -5,17 +5,21 @@
 //! the build, unless it is about a name that a later file defines.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a build step talks to cargo")]
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use esl_bytecode::compile::{Compile, Environment, GlobalFunction, GlobalVariable, drive};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::file::WriteError;
 use esl_bytecode::module::Module;
 use esl_bytecode::symbol::ESL_PACKAGE;
 use esl_bytecode::{file, link};
 use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_compiler::session::Compiler;
 use esl_vm::host::VirtualHost;
+use esl_vm::load::LoadError;
+use esl_vm::run::CallError;
 use esl_vm::vm::{Config, Vm};
 
 fn main() {
@@ -35,8 +39,40 @@ fn main() {
     }
 }
 
+/// Reason why there is no image.
+enum BuildError {
+    /// A file cannot be read.
+    Unreadable(PathBuf, std::io::Error),
+    /// The machine has no memory.
+    NoMemory,
+    /// A file does not compile. Holds the errors as they are shown.
+    DoesNotCompile(String),
+    /// A file gives no module.
+    NoModule(String),
+    /// A file cannot be loaded.
+    NotLoaded(String, LoadError),
+    /// The top level of a file fails.
+    Fails(String, CallError),
+    /// The library contains an object that no file can hold.
+    NotWritten(WriteError),
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            BuildError::Unreadable(path, error) => write!(f, "{} cannot be read: {error}", path.display()),
+            BuildError::NoMemory => f.write_str("there is no memory for a machine"),
+            BuildError::DoesNotCompile(errors) => f.write_str(errors),
+            BuildError::NoModule(name) => write!(f, "{name} gives no module"),
+            BuildError::NotLoaded(name, error) => write!(f, "{name} cannot be loaded: {error}"),
+            BuildError::Fails(name, failure) => write!(f, "{name} fails: {failure}"),
+            BuildError::NotWritten(error) => error.fmt(f),
+        }
+    }
+}
+
 /// Returns the names of the files of the library, in the order in which they are loaded.
-fn load_order(folder: &Path) -> Result<Vec<String>, String> {
+fn load_order(folder: &Path) -> Result<Vec<String>, BuildError> {
     let order = read(&folder.join("load-order"))?;
     let names = order.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
     Ok(names.map(str::to_owned).collect())
@@ -53,9 +89,9 @@ fn sources(folder: &Path) -> String {
 }
 
 /// Returns the bytes of the image.
-fn build(folder: &Path) -> Result<Vec<u8>, String> {
-    let machine =
-        Vm::new(Config::default(), Box::new(VirtualHost::new())).map_err(|error| format!("{error:?}"))?;
+fn build(folder: &Path) -> Result<Vec<u8>, BuildError> {
+    let machine = Vm::new(Config::default(), Box::new(VirtualHost::new()));
+    let machine = machine.map_err(|_| BuildError::NoMemory)?;
     let mut library =
         LibraryBuild { machine, sources: Sources::new(), modules: Vec::new(), doubts: Vec::new() };
     library.machine.set_compiler(Box::new(Compiler::default()));
@@ -66,11 +102,11 @@ fn build(folder: &Path) -> Result<Vec<u8>, String> {
     }
     library.report_doubts();
     let module = esl_vm::load::prepare(link::link(library.modules));
-    file::write(&module).map_err(|error| error.to_string())
+    file::write(&module).map_err(BuildError::NotWritten)
 }
 
-fn read(path: &Path) -> Result<String, String> {
-    std::fs::read_to_string(path).map_err(|error| format!("{} cannot be read: {error}", path.display()))
+fn read(path: &Path) -> Result<String, BuildError> {
+    std::fs::read_to_string(path).map_err(|error| BuildError::Unreadable(path.into(), error))
 }
 
 /// State of the compilation.
@@ -84,8 +120,8 @@ struct LibraryBuild {
 
 impl LibraryBuild {
     /// Compiles a file and runs it in the machine.
-    fn add(&mut self, name: &str, text: Arc<str>) -> Result<(), String> {
-        self.machine.enter_package(ESL_PACKAGE).map_err(|error| format!("{error:?}"))?;
+    fn add(&mut self, name: &str, text: Arc<str>) -> Result<(), BuildError> {
+        self.machine.enter_package(ESL_PACKAGE).map_err(|_| BuildError::NoMemory)?;
         self.machine.begin_unit();
         let source = self.sources.add(name, Some(text.clone()));
         let mut compilation = Compiler::for_source(source).compile_text(name, &text);
@@ -93,7 +129,8 @@ impl LibraryBuild {
         let (errors, warnings): (Vec<_>, Vec<_>) =
             diagnostics.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);
         if !errors.is_empty() {
-            return Err(errors.iter().map(|error| self.render(error) + "\n").collect());
+            let errors = errors.iter().map(|error| self.render(error) + "\n").collect();
+            return Err(BuildError::DoesNotCompile(errors));
         }
         for warning in warnings {
             if matches!(warning.code, "undefined-function" | "undefined-variable") {
@@ -102,12 +139,11 @@ impl LibraryBuild {
                 warn(&self.render(&warning));
             }
         }
-        let module = module.ok_or_else(|| format!("{name} gives no module"))?;
-        let functions =
-            self.machine.load_module(&module).map_err(|error| format!("{name} cannot be loaded: {error}"))?;
-        self.machine
-            .run_toplevel(functions, u64::MAX)
-            .map_err(|failure| format!("{name} fails: {failure}"))?;
+        let module = module.ok_or_else(|| BuildError::NoModule(name.into()))?;
+        let loaded = self.machine.load_module(&module);
+        let functions = loaded.map_err(|error| BuildError::NotLoaded(name.into(), error))?;
+        let ran = self.machine.run_toplevel(functions, u64::MAX);
+        ran.map_err(|failure| BuildError::Fails(name.into(), failure))?;
         self.modules.push(module);
         Ok(())
     }

@@ -23,13 +23,43 @@ use crate::operand::*;
 pub struct AssembleError {
     /// The line, from 1.
     pub line: usize,
-    /// Expected text.
-    pub message: String,
+    /// What is wrong with it.
+    pub fault: AssembleFault,
+}
+
+/// What is wrong with a line. Words are as the text has them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum AssembleFault {
+    /// No opcode has this mnemonic.
+    UnknownOpcode(String),
+    /// An operand is missing.
+    MissingOperand,
+    /// The number after `want` is missing.
+    MissingNumber,
+    /// The word is no operand, and no label.
+    NotAnOperand(String),
+    /// The number is too large for its field.
+    TooLarge(String),
+    /// The word follows the last operand.
+    Superfluous(String),
+}
+
+impl fmt::Display for AssembleFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            AssembleFault::UnknownOpcode(word) => write!(f, "no opcode is called `{word}`"),
+            AssembleFault::MissingOperand => f.write_str("expected more operands"),
+            AssembleFault::MissingNumber => f.write_str("expected a number after `want`"),
+            AssembleFault::NotAnOperand(word) => write!(f, "expected an operand, found `{word}`"),
+            AssembleFault::TooLarge(word) => write!(f, "`{word}` does not fit its operand"),
+            AssembleFault::Superfluous(word) => write!(f, "expected no more operands, found `{word}`"),
+        }
+    }
 }
 
 impl fmt::Display for AssembleError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {}: {}", self.line, self.message)
+        write!(f, "line {}: {}", self.line, self.fault)
     }
 }
 
@@ -50,24 +80,19 @@ pub fn assemble(text: &str) -> Result<Vec<u32>, AssembleError> {
         }
         words.next_if(|word| word.bytes().all(|byte| byte.is_ascii_digit()));
         let Some(mnemonic) = words.next() else { continue };
-        let error =
-            || AssembleError { line: number + 1, message: format!("no opcode is called `{mnemonic}`") };
-        let opcode = opcode(mnemonic).ok_or_else(error)?;
+        let unknown = || AssembleFault::UnknownOpcode(mnemonic.into());
+        let opcode = opcode(mnemonic).ok_or_else(|| AssembleError { line: number + 1, fault: unknown() })?;
         pc += opcode.words() as i64;
         lines.push(SourceLine { number: number + 1, opcode, next: pc, operands: words.collect() });
     }
     let mut code = Vec::new();
     for line in lines {
         let mut operands = Operands { words: line.operands.into_iter(), labels: &labels, next: line.next };
-        let instr = instruction(line.opcode, &mut operands);
-        let instr = match (instr, operands.words.next()) {
-            (Ok(instr), None) => instr,
-            (Err(message), _) => return Err(AssembleError { line: line.number, message }),
-            (Ok(_), Some(word)) => {
-                let message = format!("expected no more operands, found `{word}`");
-                return Err(AssembleError { line: line.number, message });
-            }
-        };
+        let instr = instruction(line.opcode, &mut operands).and_then(|instr| match operands.words.next() {
+            None => Ok(instr),
+            Some(word) => Err(AssembleFault::Superfluous(word.into())),
+        });
+        let instr = instr.map_err(|fault| AssembleError { line: line.number, fault })?;
         let (word, aux) = instr.encode();
         code.push(word);
         code.extend(aux);
@@ -91,19 +116,19 @@ struct Operands<'a> {
 
 impl Operands<'_> {
     /// Returns the next operand, of the type that is called `kind`.
-    fn take<T: Operand>(&mut self, kind: &str) -> Result<T, String> {
+    fn take<T: Operand>(&mut self, kind: &str) -> Result<T, AssembleFault> {
         if kind == "Pad" {
             return Ok(T::from_bits(0));
         }
-        let mut word = self.words.next().ok_or("expected more operands")?;
+        let mut word = self.words.next().ok_or(AssembleFault::MissingOperand)?;
         if kind == "Want" && word == "want" {
-            word = self.words.next().ok_or("expected a number after `want`")?;
+            word = self.words.next().ok_or(AssembleFault::MissingNumber)?;
         }
-        let value = self.value(word, kind).ok_or_else(|| format!("expected an operand, found `{word}`"))?;
+        let value = self.value(word, kind).ok_or_else(|| AssembleFault::NotAnOperand(word.into()))?;
         let operand = T::from_bits(value as u32);
         // A number that is too large for its field would come back as another one.
         let fits = T::WIDTH == 32 || (-(1 << (T::WIDTH - 1))..1 << T::WIDTH).contains(&value);
-        if fits { Ok(operand) } else { Err(format!("`{word}` does not fit its operand")) }
+        if fits { Ok(operand) } else { Err(AssembleFault::TooLarge(word.into())) }
     }
 
     fn value(&self, word: &str, kind: &str) -> Option<i64> {
@@ -130,7 +155,7 @@ macro_rules! define_assembler {
             }
         }
 
-        fn instruction(opcode: Opcode, operands: &mut Operands<'_>) -> Result<Instr, String> {
+        fn instruction(opcode: Opcode, operands: &mut Operands<'_>) -> Result<Instr, AssembleFault> {
             Ok(match opcode {
                 $( Opcode::$name => Instr::$name { $( $field: operands.take::<$ty>(stringify!($ty))? ),* }, )*
             })

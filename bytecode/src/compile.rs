@@ -368,11 +368,15 @@ pub trait CompileTimeHost: Environment {
     fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, CompileTimeFailure>;
 }
 
+/// Why there is no module of a name, and what to do, in the words of who looks for modules.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NoModule(pub String);
+
 /// Finds the module of a name.
 ///
 /// # Errors
-/// A text that says why there is none, and what to do.
-pub type Library<'a> = &'a mut dyn FnMut(&str) -> Result<Required, String>;
+/// [`NoModule`].
+pub type Library<'a> = &'a mut dyn FnMut(&str) -> Result<Required, NoModule>;
 
 /// Why a compilation was stopped from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -394,7 +398,7 @@ pub fn drive(
     compilation: &mut dyn Compilation,
     host: &mut dyn CompileTimeHost,
 ) -> (Option<Module>, Vec<Diagnostic>) {
-    let driven = drive_with(compilation, host, &mut |_| Err("there are no modules here".to_string()));
+    let driven = drive_with(compilation, host, &mut |_| Err(NoModule("there are no modules here".into())));
     driven.unwrap_or_default()
 }
 
@@ -428,7 +432,7 @@ pub fn drive_with(
             },
             Step::Require(name) => match library(&name) {
                 Ok(module) => StepOutcome::Module(module),
-                Err(reason) => StepOutcome::Failed(reason.into()),
+                Err(NoModule(reason)) => StepOutcome::Failed(reason.into()),
             },
         };
     }

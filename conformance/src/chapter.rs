@@ -4,6 +4,8 @@
 //! `lisp` block, shows the output of that block. A `repl` block is a session (see [`crate::transcript`]) that
 //! has loaded the `lisp` blocks before it. Blocks in other languages are ignored.
 
+use crate::fault::{LineFault, WrongLine};
+
 /// An example of a chapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Example {
@@ -21,8 +23,8 @@ pub enum Example {
 /// Returns the examples of a chapter, each with the line on which it begins.
 ///
 /// # Errors
-/// A message, if a block is not closed or an output block does not follow a program.
-pub fn examples(markdown: &str) -> Result<Vec<(usize, Example)>, String> {
+/// [`WrongLine`], if a block is not closed or an output block does not follow a program.
+pub fn examples(markdown: &str) -> Result<Vec<(usize, Example)>, WrongLine> {
     let mut found: Vec<(usize, Example)> = Vec::new();
     let mut lines = markdown.lines().enumerate();
     while let Some((index, line)) = lines.next() {
@@ -35,7 +37,7 @@ pub fn examples(markdown: &str) -> Result<Vec<(usize, Example)>, String> {
                     text.push_str(line);
                     text.push('\n');
                 }
-                None => return Err(format!("line {}: unclosed block", index + 1)),
+                None => return Err(LineFault::UnclosedBlock.on(index + 1)),
             }
         }
         match language.trim() {
@@ -43,7 +45,7 @@ pub fn examples(markdown: &str) -> Result<Vec<(usize, Example)>, String> {
             "repl" => found.push((index + 1, Example::Session(text))),
             "" => match found.last_mut() {
                 Some((_, Example::Program { output: output @ None, .. })) => *output = Some(text),
-                _ => return Err(format!("line {}: output without a program", index + 1)),
+                _ => return Err(LineFault::OutputWithoutProgram.on(index + 1)),
             },
             _ => {}
         }

@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::fault::{LineFault, WrongLine};
+
 /// A part of a template.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum TemplatePart {
@@ -49,15 +51,17 @@ impl Grammar {
     ///
     /// # Errors
     /// The line and its fault.
-    pub fn parse(text: &str, seed: u64) -> Result<Grammar, String> {
+    pub fn parse(text: &str, seed: u64) -> Result<Grammar, WrongLine> {
         let mut grammar = Grammar { templates: Vec::new(), by_type: BTreeMap::new(), state: seed };
+        // Lines of the templates.
+        let mut numbers = Vec::new();
         for (index, line) in text.lines().enumerate() {
             if line.is_empty() || line.starts_with('#') {
                 continue;
             }
-            let (kind, template) = line
-                .split_once("| ")
-                .ok_or_else(|| format!("line {}: expected `type| template`", index + 1))?;
+            let (kind, template) =
+                line.split_once("| ").ok_or_else(|| LineFault::NoTemplate.on(index + 1))?;
+            numbers.push(index + 1);
             let number = grammar.templates.len();
             grammar.by_type.entry(kind.to_string()).or_default().push(number);
             grammar.templates.push(Template {
@@ -66,12 +70,12 @@ impl Grammar {
                 uses: 0,
             });
         }
-        for template in &grammar.templates {
+        for (template, line) in grammar.templates.iter().zip(numbers) {
             for part in &template.parts {
                 if let TemplatePart::Hole(kind) = part
                     && !grammar.by_type.contains_key(kind)
                 {
-                    return Err(format!("there are no templates of the type `{kind}`"));
+                    return Err(LineFault::NoTemplateOf(kind.clone()).on(line));
                 }
             }
         }

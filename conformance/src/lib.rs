@@ -4,9 +4,12 @@
 pub mod anything;
 pub mod chapter;
 pub mod differential;
+pub mod fault;
 pub mod process;
 pub mod programs;
 pub mod transcript;
+
+use fault::{LineFault, WrongLine};
 
 /// A setting under which a program runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,24 +62,22 @@ impl Expectations {
     ///
     /// # Errors
     /// The line and its fault.
-    pub fn parse(text: &str) -> Result<Expectations, String> {
+    pub fn parse(text: &str) -> Result<Expectations, WrongLine> {
         let mut found = Expectations { settings: Setting::ALL.to_vec(), ..Expectations::default() };
         let mut in_header = true;
         for (index, line) in text.lines().enumerate() {
             let number = index + 1;
             in_header &= line.starts_with(';');
             if in_header {
-                found
-                    .header(line.trim_start_matches(';').trim())
-                    .map_err(|error| format!("line {number}: {error}"))?;
+                found.header(line.trim_start_matches(';').trim()).map_err(|fault| fault.on(number))?;
             }
             let Some((_, comment)) = line.split_once("; expect") else { continue };
-            found.expectation(comment, number).map_err(|error| format!("line {number}: {error}"))?;
+            found.expectation(comment, number).map_err(|fault| fault.on(number))?;
         }
         Ok(found)
     }
 
-    fn header(&mut self, line: &str) -> Result<(), String> {
+    fn header(&mut self, line: &str) -> Result<(), LineFault> {
         if let Some(reason) = line.strip_prefix("known:") {
             self.known = Some(reason.trim().to_string());
         } else if let Some(options) = line.strip_prefix("options:") {
@@ -88,24 +89,24 @@ impl Expectations {
             };
             self.settings = Setting::ALL.iter().filter(is_named).copied().collect();
             if self.settings.is_empty() {
-                return Err("no setting is named".into());
+                return Err(LineFault::NoSetting);
             }
         }
         Ok(())
     }
 
-    fn expectation(&mut self, comment: &str, line: usize) -> Result<(), String> {
-        let (kind, value) = comment.split_once(':').ok_or("expected a colon after `expect`")?;
+    fn expectation(&mut self, comment: &str, line: usize) -> Result<(), LineFault> {
+        let (kind, value) = comment.split_once(':').ok_or(LineFault::NoColon)?;
         match kind.trim() {
             "" => self.output.push(value.strip_prefix(' ').unwrap_or(value).trim_end().to_string()),
             "failure" if self.failure.is_none() => self.failure = Some((value.trim().to_string(), line)),
-            "failure" => return Err("a second failure".into()),
+            "failure" => return Err(LineFault::SecondFailure),
             "error" => self.errors.push((line, value.trim().to_string())),
             "warning" => self.warnings.push((line, value.trim().to_string())),
             "status" => {
-                self.status = Some(value.trim().parse().map_err(|_| "expected a number from 0 to 255")?)
+                self.status = Some(value.trim().parse().map_err(|_| LineFault::NoStatus)?);
             }
-            other => return Err(format!("`expect {other}` is not known")),
+            other => return Err(LineFault::UnknownExpectation(other.into())),
         }
         Ok(())
     }

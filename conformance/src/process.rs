@@ -3,6 +3,7 @@
 //! Guarantees: a command that does not end is killed, and the test panics. Both outputs are read while the
 //! command runs, so that it never waits for a full pipe.
 
+use std::fmt;
 use std::io::{Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::thread::{self, JoinHandle};
@@ -22,17 +23,25 @@ pub struct Finished {
     pub errors: String,
 }
 
+/// What a command that ought to be quiet has written to standard error.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NotQuiet(pub String);
+
+impl fmt::Display for NotQuiet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "expected nothing on standard error, found:\n{}", self.0)
+    }
+}
+
+impl std::error::Error for NotQuiet {}
+
 impl Finished {
     /// Returns the standard output.
     ///
     /// # Errors
     /// The standard error, if anything was written to it.
-    pub fn quiet_output(self) -> Result<String, String> {
-        if self.errors.is_empty() {
-            Ok(self.output)
-        } else {
-            Err(format!("expected nothing on standard error, found:\n{}", self.errors))
-        }
+    pub fn quiet_output(self) -> Result<String, NotQuiet> {
+        if self.errors.is_empty() { Ok(self.output) } else { Err(NotQuiet(self.errors)) }
     }
 }
 

@@ -14,6 +14,28 @@
 //! A line that begins with `? ` is typed, and so are the lines after it until its parentheses are closed. The
 //! text up to the next such line is the answer. Trailing blanks and empty lines at the very end are ignored.
 
+use std::fmt;
+
+/// The first place where an output differs from the expected one, with the lines around it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OutputDifference {
+    /// The line, from 1.
+    pub line: usize,
+    /// Lines that were expected.
+    pub expected: String,
+    /// Lines in their place.
+    pub found: String,
+}
+
+impl fmt::Display for OutputDifference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let OutputDifference { line, expected, found } = self;
+        write!(f, "line {line}: expected\n{expected}\nfound\n{found}")
+    }
+}
+
+impl std::error::Error for OutputDifference {}
+
 /// A transcript.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Transcript {
@@ -56,8 +78,8 @@ impl Transcript {
     /// Compares the expected output with the REPL's output.
     ///
     /// # Errors
-    /// A description of the first difference.
-    pub fn compare(&self, found: &str) -> Result<(), String> {
+    /// The first difference.
+    pub fn compare(&self, found: &str) -> Result<(), OutputDifference> {
         compare(&self.output, found)
     }
 }
@@ -65,8 +87,8 @@ impl Transcript {
 /// Compares outputs line by line.
 ///
 /// # Errors
-/// A description of the first difference, with the lines around it.
-pub fn compare(expected: &str, found: &str) -> Result<(), String> {
+/// The first difference.
+pub fn compare(expected: &str, found: &str) -> Result<(), OutputDifference> {
     let lines = |text: &str| -> Vec<String> {
         text.trim_end().lines().map(|line| line.trim_end().to_string()).collect()
     };
@@ -80,7 +102,7 @@ pub fn compare(expected: &str, found: &str) -> Result<(), String> {
         let end = lines.len().min(first + 5);
         lines[first.saturating_sub(3).min(end)..end].join("\n")
     };
-    Err(format!("line {}: expected\n{}\nfound\n{}", first + 1, part(&expected), part(&found)))
+    Err(OutputDifference { line: first + 1, expected: part(&expected), found: part(&found) })
 }
 
 /// Returns whether the parentheses and strings of a text are closed.

@@ -2,7 +2,8 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
 
 use std::collections::HashMap;
-use std::io::Write;
+use std::fmt;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -177,10 +178,31 @@ fn schedule_name(file: &Path, number: usize) -> String {
     format!("{}-{number}.schedule", if stem == "-" { "program".into() } else { stem })
 }
 
+/// Reason why a finding cannot be told.
+#[derive(Debug)]
+enum TellError {
+    /// The file with the schedule, of this name, cannot be written.
+    Schedule(String, io::Error),
+    /// The program cannot be begun again.
+    Program(Error),
+    /// The timeline cannot be written.
+    Timeline(io::Error),
+}
+
+impl fmt::Display for TellError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TellError::Schedule(name, error) => write!(f, "{name} cannot be written: {error}"),
+            TellError::Program(error) => error.fmt(f),
+            TellError::Timeline(error) => write!(f, "the timeline cannot be written: {error}"),
+        }
+    }
+}
+
 /// Writes the schedule of a finding, and prints the finding.
 ///
 /// # Errors
-/// A message, if a file cannot be written or the program cannot be begun.
+/// [`TellError`].
 fn tell(
     program: &Program,
     file: &Path,
@@ -189,11 +211,11 @@ fn tell(
     finding: &Finding,
     number: usize,
     lines: &mut PlaceTexts,
-) -> Result<(), String> {
+) -> Result<(), TellError> {
     let name = schedule_name(file, number);
     let schedule = Schedule::new(program, &options.settings, finding.choices.clone());
-    std::fs::write(&name, schedule.to_string())
-        .map_err(|error| format!("{name} cannot be written: {error}"))?;
+    let written = std::fs::write(&name, schedule.to_string());
+    written.map_err(|error| TellError::Schedule(name.clone(), error))?;
     let timeline = options.timeline.as_ref().filter(|_| number == 1);
     let pictured = Mutex::new(None);
     let prepare = |machine: &mut Vm| {
@@ -207,10 +229,10 @@ fn tell(
     let mut switches = Vec::new();
     let mut told = |switch| switches.push(switch);
     tell_switches(program, &options.settings, &finding.choices, finding.ends, &prepare, &mut told)
-        .map_err(|error| error.to_string())?;
+        .map_err(TellError::Program)?;
     if let Some(timeline) = pictured.into_inner().unwrap_or_else(PoisonError::into_inner) {
         let told = timeline.and_then(Timeline::complete);
-        told.map_err(|error| format!("the timeline cannot be written: {error}"))?;
+        told.map_err(TellError::Timeline)?;
     }
     if options.json {
         let switches: Vec<_> = switches.iter().map(|switch| text(switch, lines)).collect();

@@ -38,13 +38,13 @@ pub struct FormatOptions {
     pub lines: Option<(usize, usize)>,
 }
 
-fn parse_lines(text: &str) -> Result<(usize, usize), String> {
+fn parse_lines(text: &str) -> Result<(usize, usize), &'static str> {
     let numbers = text.split_once(':').and_then(|(first, last)| {
         Some((first.parse::<usize>().ok()?, if last.is_empty() { usize::MAX } else { last.parse().ok()? }))
     });
     match numbers {
         Some((first, last)) if first > 0 && first <= last => Ok((first, last)),
-        _ => Err("expected the numbers of the first and the last line, such as `10:25`".into()),
+        _ => Err("expected the numbers of the first and the last line, such as `10:25`"),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Requests: which function answers which.
 
+use std::fmt::Display;
+
 use lsp_server::{ErrorCode, Request, Response};
 use lsp_types::request::{
     CodeActionRequest, Completion, DocumentHighlightRequest, DocumentSymbolRequest, ExecuteCommand,
@@ -29,13 +31,7 @@ pub(super) fn answer(project: &Project, request: Request) -> Response {
         PrepareRenameRequest::METHOD => {
             reply::<PrepareRenameRequest>(request, |p| rename::prepare_rename(project, &p))
         }
-        Rename::METHOD => match serde_json::from_value(request.params) {
-            Ok(parameters) => match rename::rename(project, &parameters) {
-                Ok(edit) => Response::new_ok(request.id, edit),
-                Err(reason) => Response::new_err(request.id, ErrorCode::RequestFailed as i32, reason),
-            },
-            Err(error) => refuse(request.id, &error),
-        },
+        Rename::METHOD => try_reply::<Rename, _>(request, |p| rename::rename(project, &p).map(Some)),
         DocumentSymbolRequest::METHOD => {
             reply::<DocumentSymbolRequest>(request, |p| outline::symbols(project, &p))
         }
@@ -62,17 +58,29 @@ pub(super) fn answer(project: &Project, request: Request) -> Response {
                 - u32::from(p.range.end.character == 0 && p.range.end.line > p.range.start.line);
             formatted(project, &p.text_document.uri, Some((p.range.start.line, last)))
         }),
-        ExecuteCommand::METHOD => match serde_json::from_value(request.params) {
-            Ok(parameters) => match expand::execute(project, &parameters) {
-                Ok(text) => Response::new_ok(request.id, text),
-                Err(reason) => Response::new_err(request.id, ErrorCode::RequestFailed as i32, reason),
-            },
-            Err(error) => refuse(request.id, &error),
-        },
+        ExecuteCommand::METHOD => try_reply::<ExecuteCommand, _>(request, |p| {
+            expand::execute(project, &p).map(|text| Some(text.into()))
+        }),
         method => {
             let message = format!("`{method}` is not among what this server offers");
             Response::new_err(request.id, ErrorCode::MethodNotFound as i32, message)
         }
+    }
+}
+
+/// As [`reply`]; the answer may be a refusal, of which the client shows the text.
+fn try_reply<R: RequestKind, E: Display>(
+    request: Request,
+    answer: impl FnOnce(R::Params) -> Result<R::Result, E>,
+) -> Response {
+    match serde_json::from_value(request.params) {
+        Ok(parameters) => match answer(parameters) {
+            Ok(result) => Response::new_ok(request.id, result),
+            Err(refusal) => {
+                Response::new_err(request.id, ErrorCode::RequestFailed as i32, refusal.to_string())
+            }
+        },
+        Err(error) => refuse(request.id, &error),
     }
 }
 

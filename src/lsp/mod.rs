@@ -29,8 +29,9 @@ mod scope;
 mod semantic;
 
 use std::path::PathBuf;
+use std::{fmt, io};
 
-use lsp_server::{Connection, ErrorCode, Message, Notification, Response};
+use lsp_server::{Connection, ErrorCode, Message, Notification, ProtocolError, Response};
 use lsp_types::notification::{
     DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument, Exit,
     Notification as NotificationKind,
@@ -48,6 +49,27 @@ use check::Checker;
 use document::{ColumnUnit, path_of};
 use project::Project;
 
+/// What ended the service of a client before it said goodbye.
+#[derive(Debug)]
+enum LspError {
+    /// The client breaks the protocol, or the connection ends.
+    Protocol(ProtocolError),
+    /// The client says hello wrongly.
+    Hello(serde_json::Error),
+    /// Standard output cannot be written, or standard input not be read.
+    Streams(io::Error),
+}
+
+impl fmt::Display for LspError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LspError::Protocol(error) => error.fmt(f),
+            LspError::Hello(error) => write!(f, "the client says hello wrongly: {error}"),
+            LspError::Streams(error) => error.fmt(f),
+        }
+    }
+}
+
 /// Serves one client until it says goodbye. Returns the exit status: 0 if the client has asked for the end
 /// before, 1 if it has not, 2 if it has not said hello.
 pub fn serve(folders: Vec<PathBuf>) -> u8 {
@@ -55,7 +77,7 @@ pub fn serve(folders: Vec<PathBuf>) -> u8 {
     let result = session(&connection, folders);
     // The writing thread ends when nobody can send any more.
     drop(connection);
-    match result.and_then(|status| threads.join().map(|()| status).map_err(|error| error.to_string())) {
+    match result.and_then(|status| threads.join().map(|()| status).map_err(LspError::Streams)) {
         Ok(status) => status,
         Err(error) => {
             complain(error);
@@ -64,16 +86,15 @@ pub fn serve(folders: Vec<PathBuf>) -> u8 {
     }
 }
 
-fn session(connection: &Connection, folders: Vec<PathBuf>) -> Result<u8, String> {
-    let (id, parameters) = connection.initialize_start().map_err(|error| error.to_string())?;
-    let parameters: InitializeParams = serde_json::from_value(parameters)
-        .map_err(|error| format!("the client says hello wrongly: {error}"))?;
+fn session(connection: &Connection, folders: Vec<PathBuf>) -> Result<u8, LspError> {
+    let (id, parameters) = connection.initialize_start().map_err(LspError::Protocol)?;
+    let parameters: InitializeParams = serde_json::from_value(parameters).map_err(LspError::Hello)?;
     let unit = unit_of(&parameters);
     let result = serde_json::json!({
         "capabilities": capabilities(unit),
         "serverInfo": { "name": "eslc", "version": env!("CARGO_PKG_VERSION") },
     });
-    connection.initialize_finish(id, result).map_err(|error| error.to_string())?;
+    connection.initialize_finish(id, result).map_err(LspError::Protocol)?;
     let roots = parameters.workspace_folders.unwrap_or_default();
     let roots = roots.iter().map(|folder| path_of(&folder.uri)).collect();
     let mut project = Project::new(folders, roots, unit);

@@ -4,6 +4,7 @@
 //! binding of the new one, nor a use of the new name under the renamed binding.
 
 use std::collections::HashMap;
+use std::fmt;
 use std::ops::Range;
 
 use esl_compiler::reader::lexer::Token;
@@ -49,20 +50,60 @@ fn bare_place(text: &OpenText, node: NodeId) -> Range<usize> {
     place.start + package..place.end
 }
 
+/// Reason why a name is not renamed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum RenameRefusal {
+    /// There is no name at the position.
+    NothingHere,
+    /// The text is no name.
+    NotAName(String),
+    /// The name does not belong to this program.
+    Foreign(String),
+    /// The new name belongs to the language.
+    OfLanguage(String),
+    /// The new name is defined already, on this line if that is known.
+    Defined(String, Option<u32>),
+    /// The new name is bound where the old one is used, on this line.
+    Bound(String, u32),
+    /// The new name, on this line, would mean the renamed one.
+    Captured(String, u32),
+}
+
+impl fmt::Display for RenameRefusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RenameRefusal::NothingHere => f.write_str("there is no name here"),
+            RenameRefusal::NotAName(text) => write!(f, "`{text}` is no name"),
+            RenameRefusal::Foreign(name) => write!(f, "`{name}` does not belong to this program"),
+            RenameRefusal::OfLanguage(name) => write!(f, "`{name}` belongs to the language"),
+            RenameRefusal::Defined(name, None) => write!(f, "`{name}` is defined already"),
+            RenameRefusal::Defined(name, Some(line)) => {
+                write!(f, "`{name}` is defined already, on line {line}")
+            }
+            RenameRefusal::Bound(name, line) => {
+                write!(f, "`{name}` is another local name here: it is bound on line {line}")
+            }
+            RenameRefusal::Captured(name, line) => {
+                write!(f, "`{name}` on line {line} would mean the renamed one")
+            }
+        }
+    }
+}
+
 /// Renames the name at a position in its text and, if it is global, in all that share it.
 ///
 /// # Errors
 /// Why it cannot be renamed.
-pub(super) fn rename(project: &Project, parameters: &RenameParams) -> Result<WorkspaceEdit, String> {
-    let found = name_at(project, &parameters.text_document_position).ok_or("there is no name here")?;
+pub(super) fn rename(project: &Project, parameters: &RenameParams) -> Result<WorkspaceEdit, RenameRefusal> {
+    let found = name_at(project, &parameters.text_document_position).ok_or(RenameRefusal::NothingHere)?;
     let new = &parameters.new_name;
     let tree = SyntaxTree::new(new.as_str());
     let is_name = tree.data(0).count() == 1 && tree.name(1) == Some(new) && !new.contains(':');
     if !is_name || new.chars().all(|c| c == '.' || c.is_ascii_digit()) {
-        return Err(format!("`{new}` is no name"));
+        return Err(RenameRefusal::NotAName(new.clone()));
     }
     if found.binding.is_none() && !is_defined_by_program(project, &found) {
-        return Err(format!("`{}` does not belong to this program", found.name));
+        return Err(RenameRefusal::Foreign(found.name.to_string()));
     }
     let wanted = new.to_lowercase();
     // Another way to write the same name changes nothing.
@@ -124,7 +165,7 @@ fn key_parameter(tree: &SyntaxTree, name: NodeId) -> Option<WrittenKey> {
 }
 
 /// Refuses the name of another definition of the same sort, and for functions those of the language.
-fn refuse_defined(project: &Project, found: &NameAt<'_>, new: &str) -> Result<(), String> {
+fn refuse_defined(project: &Project, found: &NameAt<'_>, new: &str) -> Result<(), RenameRefusal> {
     let sort = |kind: DefinedAs| match kind {
         DefinedAs::Function | DefinedAs::Macro | DefinedAs::Operator | DefinedAs::Slot => 0,
         DefinedAs::Variable | DefinedAs::Constant => 1,
@@ -141,15 +182,15 @@ fn refuse_defined(project: &Project, found: &NameAt<'_>, new: &str) -> Result<()
     if let Some(name) =
         language().find(new).filter(|name| name.is_public && own.contains(&sort(name.definition.kind)))
     {
-        return Err(format!("`{}` belongs to the language", name.definition.name));
+        return Err(RenameRefusal::OfLanguage(name.definition.name.to_string()));
     }
     let is_same_sort =
         |kind| found.binding.is_none() && (own.contains(&sort(kind)) || kind == DefinedAs::Other);
     match project.find(found.text, new).into_iter().find(|(name, _)| is_same_sort(name.kind)) {
-        Some((_, Some(place))) => {
-            Err(format!("`{new}` is defined already, on line {}", place.range.start.line + 1))
+        Some((_, place)) => {
+            let line = place.map(|place| place.range.start.line + 1);
+            Err(RenameRefusal::Defined(new.into(), line))
         }
-        Some((_, None)) => Err(format!("`{new}` is defined already")),
         None => Ok(()),
     }
 }
@@ -160,7 +201,7 @@ fn refuse_capture(
     uses: &[NodeId],
     binding: Option<LocalBinding>,
     new: &str,
-) -> Result<(), String> {
+) -> Result<(), RenameRefusal> {
     let tree = &text.tree;
     let line = |node: NodeId| text.position(tree.range(node).start).line + 1;
     let is_new = |name: NodeId| tree.name(name).map(bare_name).is_some_and(|name| name == new);
@@ -172,10 +213,7 @@ fn refuse_capture(
             is_inside && other.sort == sort && is_new(other.name)
         };
         if let Some(other) = bindings_around(tree, node).into_iter().find(captures) {
-            return Err(format!(
-                "`{new}` is another local name here: it is bound on line {}",
-                line(other.name)
-            ));
+            return Err(RenameRefusal::Bound(new.into(), line(other.name)));
         }
     }
     let Some(binding) = binding else { return Ok(()) };
@@ -186,7 +224,7 @@ fn refuse_capture(
         let is_same_sort = sort_at(tree, node) == binding.sort;
         let is_free = binding_of(tree, node).is_none_or(|other| tree.range(other.scope).start < scope.start);
         if !is_quoted && is_same_sort && is_free {
-            return Err(format!("`{new}` on line {} would mean the renamed one", line(node)));
+            return Err(RenameRefusal::Captured(new.into(), line(node)));
         }
     }
     Ok(())

@@ -12,7 +12,7 @@ use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
 use bytes::Bytes;
-use esl_world::TlsIdentity;
+use esl_world::{NoEventLoop, TlsIdentity};
 use http_body_util::combinators::BoxBody;
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::Incoming;
@@ -32,7 +32,7 @@ const HEAD: usize = 16 << 10;
 /// Time that a peer has for the head of a request.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 
-/// HttpBody of an answer.
+/// Body of an answer.
 pub(super) type HttpBody = BoxBody<Bytes, Infallible>;
 
 /// Ends the connection of a request, whatever is on its way.
@@ -54,7 +54,7 @@ pub(super) fn serve<F, R>(
     listener: TcpListener,
     identity: Option<TlsIdentity>,
     handler: F,
-) -> Result<(), String>
+) -> Result<(), NoEventLoop>
 where
     F: Fn(Request<Incoming>, Hangup) -> R + Clone + Send + Sync + 'static,
     R: Future<Output = Response<HttpBody>> + Send + 'static,

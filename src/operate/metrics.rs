@@ -4,7 +4,7 @@ use std::fmt::{Display, Write};
 use std::net::TcpListener;
 
 use esl_vm::host::{Survey, SurveyRequest, TaskStanding};
-use esl_world::TlsIdentity;
+use esl_world::{NoEventLoop, TlsIdentity};
 use hyper::{Method, StatusCode};
 
 use super::http::{self, plain, with};
@@ -18,7 +18,7 @@ pub(super) fn serve(
     listener: TcpListener,
     identity: Option<TlsIdentity>,
     scope: RunScope,
-) -> Result<(), String> {
+) -> Result<(), NoEventLoop> {
     http::serve(listener, identity, move |request, _| {
         let scope = scope.clone();
         async move {

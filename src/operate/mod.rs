@@ -38,6 +38,7 @@ mod metrics;
 mod monitor;
 #[doc(hidden)]
 pub mod noise;
+mod refusal;
 mod scope;
 mod secrets;
 mod slime;
@@ -47,7 +48,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use esl_vm::vm::Vm;
-use esl_world::TlsIdentity;
+use esl_world::{NoEventLoop, TlsIdentity};
 
 use crate::command::{USAGE, complain};
 use attach::Entrance;
@@ -166,12 +167,12 @@ impl OperateOptions {
     }
 
     fn secrets(&self) -> Result<Secrets, u8> {
-        let secrets = match &self.secrets {
-            None => Secrets::random(),
-            Some(path) => Secrets::read(path).map_err(|reason| format!("{}: {reason}", path.display())),
-        };
-        secrets.map_err(|reason| {
-            complain(reason);
+        let made = self.secrets.as_deref().map_or_else(Secrets::random, Secrets::read);
+        made.map_err(|error| {
+            match &self.secrets {
+                None => complain(error),
+                Some(path) => complain(format_args!("{}: {error}", path.display())),
+            }
             USAGE
         })
     }
@@ -260,7 +261,7 @@ fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), u8> {
     })
 }
 
-fn serve(served: Result<(), String>) -> Result<(), u8> {
+fn serve(served: Result<(), NoEventLoop>) -> Result<(), u8> {
     served.map_err(|error| {
         complain(format_args!("the event loop cannot be started: {error}"));
         USAGE

@@ -1,7 +1,7 @@
 //! Roles of those who connect to a run, and the secrets by which they are known.
 
-use std::fmt;
 use std::path::Path;
+use std::{fmt, io};
 
 use subtle::{Choice, ConstantTimeEq};
 
@@ -37,6 +37,50 @@ impl fmt::Display for OperatorRole {
     }
 }
 
+/// Reason why there are no secrets.
+#[derive(Debug)]
+pub(super) enum SecretsError {
+    /// The system gives no random numbers.
+    NoRandom(getrandom::Error),
+    /// The file cannot be read.
+    Unreadable(io::Error),
+    /// Others than the owner may read or write the file.
+    #[cfg(unix)]
+    Exposed,
+    /// This line does not begin with a role, from 1.
+    NoRole(usize),
+    /// The secret in this line is too short, too long, or has other characters than it may.
+    NotGood(usize),
+    /// The secret in this line is that of another role.
+    Repeated(usize),
+    /// The file has none.
+    Nothing,
+}
+
+impl fmt::Display for SecretsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SecretsError::NoRandom(error) => error.fmt(f),
+            SecretsError::Unreadable(error) => error.fmt(f),
+            #[cfg(unix)]
+            SecretsError::Exposed => f.write_str("others may read or write it: use chmod 600"),
+            SecretsError::NoRole(line) => {
+                write!(f, "line {line} has no role: expected `observe`, `command` or `patch`, and a secret")
+            }
+            SecretsError::NotGood(line) => write!(
+                f,
+                "the secret in line {line} is not good: expected {SHORTEST} to {LONGEST} letters, digits and signs"
+            ),
+            SecretsError::Repeated(line) => {
+                write!(f, "the secret in line {line} is that of another role")
+            }
+            SecretsError::Nothing => f.write_str("it has no secrets"),
+        }
+    }
+}
+
+impl std::error::Error for SecretsError {}
+
 /// Fewest characters of a secret in a file.
 const SHORTEST: usize = 16;
 /// Most characters.
@@ -51,13 +95,13 @@ impl Secrets {
     ///
     /// # Errors
     /// The reason, if the system gives no random numbers.
-    pub(super) fn random() -> Result<Secrets, String> {
+    pub(super) fn random() -> Result<Secrets, SecretsError> {
         let make = |role| {
             let mut bytes = [0; 16];
-            getrandom::fill(&mut bytes).map_err(|error| error.to_string())?;
+            getrandom::fill(&mut bytes).map_err(SecretsError::NoRandom)?;
             Ok((role, bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
         };
-        Ok(Secrets(OperatorRole::ALL.into_iter().map(make).collect::<Result<_, String>>()?))
+        Ok(Secrets(OperatorRole::ALL.into_iter().map(make).collect::<Result<_, SecretsError>>()?))
     }
 
     /// Reads secrets from a file: lines of the name of a role and its secret. A role without a line has none,
@@ -65,20 +109,20 @@ impl Secrets {
     ///
     /// # Errors
     /// The reason, if the file cannot be read, is not one of secrets, or can be read by others.
-    pub(super) fn read(path: &Path) -> Result<Secrets, String> {
-        let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
+    pub(super) fn read(path: &Path) -> Result<Secrets, SecretsError> {
+        let text = std::fs::read_to_string(path).map_err(SecretsError::Unreadable)?;
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
-            let mode = std::fs::metadata(path).map_err(|error| error.to_string())?.permissions().mode();
+            let mode = std::fs::metadata(path).map_err(SecretsError::Unreadable)?.permissions().mode();
             if mode & 0o077 != 0 {
-                return Err("others may read or write it: use chmod 600".into());
+                return Err(SecretsError::Exposed);
             }
         }
         Secrets::parse(&text)
     }
 
-    pub(super) fn parse(text: &str) -> Result<Secrets, String> {
+    pub(super) fn parse(text: &str) -> Result<Secrets, SecretsError> {
         let mut secrets = Vec::new();
         let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
         for (number, line) in lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')) {
@@ -86,22 +130,18 @@ impl Secrets {
             let parts = line.split_once(char::is_whitespace);
             let Some((role, secret)) = parts.and_then(|(name, rest)| Some((role_of(name)?, rest.trim())))
             else {
-                return Err(format!(
-                    "line {number} has no role: expected `observe`, `command` or `patch`, and a secret"
-                ));
+                return Err(SecretsError::NoRole(number));
             };
             if !(SHORTEST..=LONGEST).contains(&secret.len()) || !secret.bytes().all(|b| b.is_ascii_graphic())
             {
-                return Err(format!(
-                    "the secret in line {number} is not good: expected {SHORTEST} to {LONGEST} letters, digits and signs"
-                ));
+                return Err(SecretsError::NotGood(number));
             }
             if secrets.iter().any(|(_, other)| other == secret) {
-                return Err(format!("the secret in line {number} is that of another role"));
+                return Err(SecretsError::Repeated(number));
             }
             secrets.push((role, secret.to_string()));
         }
-        if secrets.is_empty() { Err("it has no secrets".into()) } else { Ok(Secrets(secrets)) }
+        if secrets.is_empty() { Err(SecretsError::Nothing) } else { Ok(Secrets(secrets)) }
     }
 
     /// Returns the greatest role that a secret gives. How long that takes says nothing about the secrets but
@@ -154,7 +194,7 @@ mod tests {
             ("\nobserve short", "line 2 is not good"),
             ("observe 0123456789abcdef\npatch 0123456789abcdef", "another role"),
         ] {
-            let found = Secrets::parse(text).err().unwrap_or_default();
+            let found = Secrets::parse(text).err().map(|error| error.to_string()).unwrap_or_default();
             assert!(found.contains(reason), "{text:?}: {found}");
         }
     }

@@ -1,6 +1,6 @@
 //! Compiling sources to a program, and expanding their macros.
 
-use esl_bytecode::compile::{Halt, drive_with};
+use esl_bytecode::compile::{Halt, NoModule, drive_with};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
 use esl_compiler::cover::CountedPlace;
@@ -135,7 +135,7 @@ fn compile_texts(
     machine: Result<Vm, Error>,
     watch: &mut dyn FnMut(Inbox),
 ) -> Compiled {
-    let mut find = |name: &str| path.find(name).map_err(|error| error.to_string());
+    let mut find = |name: &str| path.find(name).map_err(|error| NoModule(error.to_string()));
     let (mut stopped, mut passages) = (None, Vec::new());
     let (module, diagnostics) = match machine {
         Ok(mut machine) => {

@@ -1,8 +1,9 @@
 //! The REPL of a run that is under way elsewhere: lines are typed here, and evaluated there.
 
-use std::io::{IsTerminal, Read, Write};
+use std::fmt;
+use std::io::{self, IsTerminal, Read, Write};
 use std::net::{Shutdown, TcpStream};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
@@ -55,6 +56,72 @@ pub enum AttachSecurity<'a> {
     Tls(Option<&'a Path>),
 }
 
+/// Reason why a session could not be begun.
+#[derive(Debug)]
+enum AttachError {
+    /// No run can be reached at this address.
+    Unreachable(String, io::Error),
+    /// Nobody has said the secret.
+    NoSecret,
+    /// The file with the secret cannot be read.
+    SecretFile(PathBuf, io::Error),
+    /// No thread can be made to read standard input.
+    NoReader(io::Error),
+    /// No thread can be made to hear the run.
+    NoHearer(io::Error),
+    /// The connection cannot be shared, or no thread can be made to interrupt the run.
+    Connection(io::Error),
+}
+
+impl fmt::Display for AttachError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            AttachError::Unreachable(address, error) => {
+                write!(f, "no run can be reached at {address}: {error}")
+            }
+            AttachError::NoSecret => {
+                write!(f, "a port asks for a secret: use --secret-file, or the environment variable {SECRET}")
+            }
+            AttachError::SecretFile(file, error) => write!(f, "{}: {error}", file.display()),
+            AttachError::NoReader(error) => {
+                write!(f, "no thread can be made to read standard input: {error}")
+            }
+            AttachError::NoHearer(error) => write!(f, "no thread can be made to hear the run: {error}"),
+            AttachError::Connection(error) => error.fmt(f),
+        }
+    }
+}
+
+/// Reason why a request came to nothing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum RequestRefusal {
+    /// The run says so, in these words.
+    ByRun(String),
+    /// The run has answered something that is no answer.
+    NotAnAnswer,
+    /// The command needs something.
+    Needs(String, &'static str),
+    /// The file cannot be read, for the reason that the system gives.
+    Unreadable(String, String),
+    /// There is no patch to be undone.
+    NoPatch,
+}
+
+impl fmt::Display for RequestRefusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RequestRefusal::ByRun(text) => f.write_str(text),
+            RequestRefusal::NotAnAnswer => f.write_str("it is no answer"),
+            RequestRefusal::Needs(command, needed) => write!(f, "`{command}` needs {needed}"),
+            RequestRefusal::Unreadable(file, reason) => write!(f, "{file} cannot be read: {reason}"),
+            RequestRefusal::NoPatch => f.write_str("there is no patch to be undone"),
+        }
+    }
+}
+
+/// What a request comes to.
+type RunAnswer = Result<WireForm, RequestRefusal>;
+
 /// A connection to a run.
 enum Wire {
     Tcp(TcpStream),
@@ -75,8 +142,7 @@ fn secured(
     stream: TcpStream,
     address: &str,
     ca_file: Option<&Path>,
-) -> std::io::Result<std::os::unix::net::UnixStream> {
-    use std::io::Error;
+) -> io::Result<std::os::unix::net::UnixStream> {
     use std::os::unix::net::UnixStream;
     let (near, far) = UnixStream::pair()?;
     for end in [&far, &near] {
@@ -88,9 +154,10 @@ fn secured(
     let (tell, told) = channel();
     let pass_on = async move {
         let begin = async {
-            let stream = tokio::net::TcpStream::from_std(stream).map_err(|error| error.to_string())?;
-            let far = tokio::net::UnixStream::from_std(far).map_err(|error| error.to_string())?;
-            Ok::<_, String>((esl_world::begin_tls(stream, &name, ca_file.as_deref()).await?, far))
+            let stream = tokio::net::TcpStream::from_std(stream)?;
+            let far = tokio::net::UnixStream::from_std(far)?;
+            let secured = esl_world::begin_tls(stream, &name, ca_file.as_deref()).await;
+            Ok::<_, io::Error>((secured.map_err(io::Error::other)?, far))
         };
         match tokio::time::timeout(PATIENCE, begin).await {
             Ok(Ok((mut stream, mut far))) => {
@@ -99,20 +166,20 @@ fn secured(
                 drop(tokio::io::copy_bidirectional(&mut stream, &mut far).await);
             }
             Ok(Err(reason)) => _ = tell.send(Err(reason)),
-            Err(_) => _ = tell.send(Err("the run does not speak TLS".into())),
+            Err(_) => _ = tell.send(Err(io::Error::other("the run does not speak TLS"))),
         }
     };
-    esl_world::spawn(pass_on).map_err(Error::other)?;
-    told.recv().map_err(Error::other)?.map_err(Error::other)?;
+    esl_world::spawn(pass_on).map_err(io::Error::other)?;
+    told.recv().map_err(io::Error::other)??;
     Ok(near)
 }
 
 impl Wire {
-    fn connect(address: &str, security: AttachSecurity<'_>) -> std::io::Result<Wire> {
+    fn connect(address: &str, security: AttachSecurity<'_>) -> io::Result<Wire> {
         let port = address.parse::<u16>().map(|port| format!("127.0.0.1:{port}"));
         let is_path = port.is_err() && (address.contains('/') || !address.contains(':'));
         if is_path && matches!(security, AttachSecurity::Tls(_)) {
-            return Err(std::io::Error::other("a path needs no TLS: leave out --tls and --ca-file"));
+            return Err(io::Error::other("a path needs no TLS: leave out --tls and --ca-file"));
         }
         #[cfg(unix)]
         if is_path {
@@ -127,7 +194,7 @@ impl Wire {
             #[cfg(unix)]
             AttachSecurity::Tls(ca_file) => secured(stream, &address, ca_file).map(Wire::Secured),
             #[cfg(not(unix))]
-            AttachSecurity::Tls(_) => Err(std::io::Error::other("there is no TLS here: use ssh -L")),
+            AttachSecurity::Tls(_) => Err(io::Error::other("there is no TLS here: use ssh -L")),
         }
     }
 
@@ -139,7 +206,7 @@ impl Wire {
         true
     }
 
-    fn try_clone(&self) -> std::io::Result<Wire> {
+    fn try_clone(&self) -> io::Result<Wire> {
         match self {
             Wire::Tcp(stream) => stream.try_clone().map(Wire::Tcp),
             #[cfg(unix)]
@@ -160,7 +227,7 @@ impl Wire {
 }
 
 impl Read for Wire {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self {
             Wire::Tcp(stream) => stream.read(buffer),
             #[cfg(unix)]
@@ -170,7 +237,7 @@ impl Read for Wire {
 }
 
 impl Write for Wire {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
             Wire::Tcp(stream) => stream.write(bytes),
             #[cfg(unix)]
@@ -178,7 +245,7 @@ impl Write for Wire {
         }
     }
 
-    fn flush(&mut self) -> std::io::Result<()> {
+    fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
 }
@@ -203,14 +270,12 @@ impl SessionPrinter {
 }
 
 /// Reads the secret: that of the file, or of the environment.
-fn secret(file: Option<&Path>) -> Result<String, String> {
+fn secret(file: Option<&Path>) -> Result<String, AttachError> {
     match file {
-        None => std::env::var(SECRET).map_err(|_| {
-            format!("a port asks for a secret: use --secret-file, or the environment variable {SECRET}")
-        }),
+        None => std::env::var(SECRET).map_err(|_| AttachError::NoSecret),
         Some(file) => {
-            let text =
-                std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
+            let unread = |error| AttachError::SecretFile(file.into(), error);
+            let text = std::fs::read_to_string(file).map_err(unread)?;
             let line = text.lines().next().unwrap_or_default().trim();
             Ok(line.rsplit(char::is_whitespace).next().unwrap_or_default().to_string())
         }
@@ -228,12 +293,12 @@ pub fn attach(
     secret_file: Option<&Path>,
     rights: &Rights,
 ) -> Result<u8, u8> {
-    let usage = |error: String| {
+    let usage = |error: AttachError| {
         complain(error);
         USAGE
     };
     let mut wire = Wire::connect(address, security)
-        .map_err(|error| usage(format!("no run can be reached at {address}: {error}")))?;
+        .map_err(|error| usage(AttachError::Unreachable(address.into(), error)))?;
     if wire.needs_secret() {
         let secret = secret(secret_file).map_err(usage)?;
         // A run that refuses it closes the connection, which the reader sees.
@@ -244,18 +309,18 @@ pub fn attach(
     let printer = SessionPrinter { screen: screen.clone(), is_interactive };
     let inbox = Inbox::new();
     let typing = Typing::begin(is_interactive, screen, inbox.clone())
-        .map_err(|error| usage(format!("no thread can be made to read standard input: {error}")))?;
+        .map_err(|error| usage(AttachError::NoReader(error)))?;
     let lines = typing.other_lines();
     let (answer, answers) = channel();
-    let from = wire.try_clone().map_err(|error| usage(error.to_string()))?;
+    let from = wire.try_clone().map_err(|error| usage(AttachError::Connection(error)))?;
     let hears = printer.clone();
     let heard = std::thread::Builder::new().name("run".into()).spawn(move || {
         hear(from, &hears, &answer);
         drop(answer);
         drop(lines.send(Line::End));
     });
-    heard.map_err(|error| usage(format!("no thread can be made to hear the run: {error}")))?;
-    interrupt_run(&wire, &typing, inbox).map_err(usage)?;
+    heard.map_err(|error| usage(AttachError::NoHearer(error)))?;
+    interrupt_run(&wire, &typing, inbox).map_err(|error| usage(AttachError::Connection(error)))?;
     let mut attached = Attached { wire, answers, typing, printer, asked: 0, failure: None };
     let status = attached.begin(address, rights).and_then(|()| attached.talk());
     attached.wire.close();
@@ -263,8 +328,8 @@ pub fn attach(
 }
 
 /// Has Ctrl-C interrupt what the session evaluates.
-fn interrupt_run(wire: &Wire, typing: &Typing, inbox: Inbox) -> Result<(), String> {
-    let mut wire = wire.try_clone().map_err(|error| error.to_string())?;
+fn interrupt_run(wire: &Wire, typing: &Typing, inbox: Inbox) -> io::Result<()> {
+    let mut wire = wire.try_clone()?;
     let lines = typing.other_lines();
     let signals = Inbox::new();
     let interrupts = interrupt_on_signal(signals.clone(), move |signal| {
@@ -285,11 +350,11 @@ fn interrupt_run(wire: &Wire, typing: &Typing, inbox: Inbox) -> Result<(), Strin
         }
     };
     let started = std::thread::Builder::new().name("interrupts".into()).spawn(pass_on);
-    started.map(drop).map_err(|error| error.to_string())
+    started.map(drop)
 }
 
 /// Prints what the run writes, and passes answers on, until the connection ends.
-fn hear(mut from: Wire, printer: &SessionPrinter, answers: &Sender<(i64, Result<WireForm, String>)>) {
+fn hear(mut from: Wire, printer: &SessionPrinter, answers: &Sender<(i64, RunAnswer)>) {
     while let Ok(form) = attach::read(&mut from) {
         let items = form.items().unwrap_or_default();
         match (items.first().and_then(WireForm::name).as_deref(), items) {
@@ -297,8 +362,8 @@ fn hear(mut from: Wire, printer: &SessionPrinter, answers: &Sender<(i64, Result<
             (Some(":return"), [_, result, WireForm::Integer(number)]) => {
                 let result = match result.items() {
                     Some([kind, value]) if kind.name().as_deref() == Some(":ok") => Ok(value.clone()),
-                    Some([_, WireForm::Text(reason)]) => Err(reason.clone()),
-                    _ => Err("it is no answer".into()),
+                    Some([_, WireForm::Text(reason)]) => Err(RequestRefusal::ByRun(reason.clone())),
+                    _ => Err(RequestRefusal::NotAnAnswer),
                 };
                 if answers.send((*number, result)).is_err() {
                     return;
@@ -312,7 +377,7 @@ fn hear(mut from: Wire, printer: &SessionPrinter, answers: &Sender<(i64, Result<
 /// A session.
 struct Attached {
     wire: Wire,
-    answers: Receiver<(i64, Result<WireForm, String>)>,
+    answers: Receiver<(i64, RunAnswer)>,
     typing: Typing,
     printer: SessionPrinter,
     /// Number of requests so far.
@@ -341,7 +406,7 @@ impl Attached {
     }
 
     /// Asks something, and waits for the answer.
-    fn ask(&mut self, name: &str, arguments: &[WireForm]) -> Result<Result<WireForm, String>, Disconnected> {
+    fn ask(&mut self, name: &str, arguments: &[WireForm]) -> Result<RunAnswer, Disconnected> {
         let asked = self.send(name, arguments)?;
         loop {
             let (number, answer) = self.answers.recv().map_err(|_| Disconnected)?;
@@ -374,7 +439,7 @@ impl Attached {
             let refused = match self.ask("esl:rights", &parts) {
                 Ok(Ok(value)) if value.name().as_deref() == Some("t") => None,
                 Ok(Ok(value)) => Some(value.to_string()),
-                Ok(Err(reason)) => Some(reason),
+                Ok(Err(reason)) => Some(reason.to_string()),
                 Err(Disconnected) => Some("the run has ended".into()),
             };
             if let Some(reason) = refused {
@@ -465,7 +530,7 @@ impl Attached {
     }
 
     /// Prints what came of a request, but for values that say nothing.
-    fn show(&mut self, answer: Result<WireForm, String>) {
+    fn show(&mut self, answer: RunAnswer) {
         match answer {
             Err(reason) => self.printer.print(&format!("; {reason}\n")),
             Ok(WireForm::Text(text)) => self.printer.print(&text),
@@ -492,9 +557,10 @@ impl Attached {
             _ => None,
         };
         if let (Some(needed), false) = (needed, matches!(number, WireForm::Integer(_))) {
-            self.show(Err(format!("`{command}` needs {needed}")));
+            self.show(Err(RequestRefusal::Needs(command.into(), needed)));
             return Ok(());
         }
+        let needs = |needed| Err(RequestRefusal::Needs(command.into(), needed));
         let answer = match command {
             ":tasks" => self.ask("esl:tasks", &[])?,
             ":bt" if rest.is_empty() => {
@@ -523,7 +589,7 @@ impl Attached {
                 self.ask("esl:signal", &[WireForm::text(name), WireForm::text(data)])?
             }
             ":patch" if !rest.is_empty() => match std::fs::read_to_string(rest) {
-                Err(error) => Err(format!("{rest} cannot be read: {error}")),
+                Err(error) => Err(RequestRefusal::Unreadable(rest.into(), error.to_string())),
                 Ok(text) => {
                     let answer = self.ask("esl:patch", &[WireForm::text(rest), WireForm::Text(text)])?;
                     match answer {
@@ -538,12 +604,12 @@ impl Attached {
                 Ok(WireForm::Integer(count)) => {
                     Ok(WireForm::Text(format!("; {count} definitions are as before\n")))
                 }
-                Ok(WireForm::List(items)) if items.is_empty() => Err("there is no patch to be undone".into()),
+                Ok(WireForm::List(items)) if items.is_empty() => Err(RequestRefusal::NoPatch),
                 answer => answer,
             },
-            ":watch" => Err("`:watch` needs a form".into()),
-            ":signal" => Err("`:signal` needs the name of an input, or of a variable with an event".into()),
-            ":patch" => Err("`:patch` needs the path of a file".into()),
+            ":watch" => needs("a form"),
+            ":signal" => needs("the name of an input, or of a variable with an event"),
+            ":patch" => needs("the path of a file"),
             _ => Ok(WireForm::text(HELP)),
         };
         self.show(answer);

@@ -7,7 +7,41 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use esl_vm::observe::{Observer, Seen};
 use esl_vm::task::TaskNumber;
 
-use super::pattern::FactPattern;
+use super::pattern::{FactPattern, NotAPattern};
+
+/// Reason why a text names no place to go to, or nothing to stop at.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum StopError {
+    /// The text is no number.
+    NotANumber(String),
+    /// The text is no number of seconds, or one that no run has.
+    NotSeconds(String),
+    /// The text names no kind of place.
+    NotAPlace,
+    /// A name is missing.
+    NoName,
+    /// The text is no pattern of facts.
+    Pattern(NotAPattern),
+    /// The text names no kind of breakpoint.
+    NotABreakpoint,
+}
+
+impl fmt::Display for StopError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            StopError::NotANumber(text) => write!(f, "expected a number, found `{text}`"),
+            StopError::NotSeconds(text) => write!(f, "expected seconds, found `{text}`"),
+            StopError::NotAPlace => f.write_str("expected tick:N, turn:N, time:SECONDS, record:N or failure"),
+            StopError::NoName => f.write_str("expected a name"),
+            StopError::Pattern(error) => error.fmt(f),
+            StopError::NotABreakpoint => {
+                f.write_str("expected failure, failure:CAUSE, task:NAME, fact:PATTERN or function:NAME")
+            }
+        }
+    }
+}
+
+impl std::error::Error for StopError {}
 
 /// A place to go to.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,10 +59,10 @@ pub(super) enum Target {
 }
 
 impl FromStr for Target {
-    type Err = String;
+    type Err = StopError;
 
-    fn from_str(text: &str) -> Result<Target, String> {
-        let number = |text: &str| text.parse().map_err(|_| format!("expected a number, found `{text}`"));
+    fn from_str(text: &str) -> Result<Target, StopError> {
+        let number = |text: &str| text.parse().map_err(|_| StopError::NotANumber(text.into()));
         match text.split_once(':') {
             None if text == "failure" => Ok(Target::Failure),
             Some(("tick", n)) => number(n).map(Target::Tick),
@@ -36,9 +70,9 @@ impl FromStr for Target {
             Some(("record", n)) => number(n).map(Target::Record),
             Some(("time", seconds)) => match seconds.parse::<f64>() {
                 Ok(seconds) if (0.0..1e9).contains(&seconds) => Ok(Target::Time((seconds * 1e9) as u64)),
-                _ => Err(format!("expected seconds, found `{seconds}`")),
+                _ => Err(StopError::NotSeconds(seconds.into())),
             },
-            _ => Err("expected tick:N, turn:N, time:SECONDS, record:N or failure".into()),
+            _ => Err(StopError::NotAPlace),
         }
     }
 }
@@ -57,11 +91,11 @@ pub(super) enum Breakpoint {
 }
 
 impl FromStr for Breakpoint {
-    type Err = String;
+    type Err = StopError;
 
-    fn from_str(text: &str) -> Result<Breakpoint, String> {
+    fn from_str(text: &str) -> Result<Breakpoint, StopError> {
         let named = |name: &str| match name.trim() {
-            "" => Err("expected a name".to_string()),
+            "" => Err(StopError::NoName),
             name => Ok(name.to_uppercase()),
         };
         match text.split_once(':') {
@@ -71,9 +105,11 @@ impl FromStr for Breakpoint {
                 Ok(Breakpoint::Failure(Some(cause)))
             }
             Some(("task", name)) => named(name).map(Breakpoint::Task),
-            Some(("fact", pattern)) => FactPattern::parse(pattern).map(Breakpoint::Fact),
+            Some(("fact", pattern)) => {
+                FactPattern::parse(pattern).map(Breakpoint::Fact).map_err(StopError::Pattern)
+            }
             Some(("function", name)) => named(name).map(Breakpoint::Function),
-            _ => Err("expected failure, failure:CAUSE, task:NAME, fact:PATTERN or function:NAME".into()),
+            _ => Err(StopError::NotABreakpoint),
         }
     }
 }

@@ -9,6 +9,16 @@ enum Item {
     List(Vec<Item>),
 }
 
+/// A text that is no pattern.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct NotAPattern(String);
+
+impl fmt::Display for NotAPattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "expected a fact in parentheses, such as (door ?name open), found `{}`", self.0)
+    }
+}
+
 /// Most lists inside each other.
 const DEPTH: usize = 100;
 
@@ -23,11 +33,11 @@ impl FactPattern {
     /// Reads a pattern.
     ///
     /// # Errors
-    /// What was expected.
-    pub(super) fn parse(text: &str) -> Result<FactPattern, String> {
+    /// [`NotAPattern`].
+    pub(super) fn parse(text: &str) -> Result<FactPattern, NotAPattern> {
         match read(text) {
             Some(item @ Item::List(_)) => Ok(FactPattern { text: text.trim().into(), item }),
-            _ => Err(format!("expected a fact in parentheses, such as (door ?name open), found `{text}`")),
+            _ => Err(NotAPattern(text.into())),
         }
     }
 

@@ -1,7 +1,9 @@
 //! The event loop: one thread that does what all machines of the process ask of the system.
 
 use std::cell::Cell;
+use std::fmt;
 use std::future::Future;
+use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -10,20 +12,36 @@ use std::task::{Context, Poll, Wake, Waker};
 use tokio::runtime::{Builder, Handle};
 
 /// Its handle, or the reason why there is none.
-static LOOP: OnceLock<Result<Handle, String>> = OnceLock::new();
+static LOOP: OnceLock<io::Result<Handle>> = OnceLock::new();
+
+/// The system gave no thread or no descriptors for the event loop, which is started once in a process.
+#[derive(Clone, Copy, Debug)]
+pub struct NoEventLoop(&'static io::Error);
+
+impl fmt::Display for NoEventLoop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl std::error::Error for NoEventLoop {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        Some(self.0)
+    }
+}
+
+/// Returns the handle of the event loop, which is started by the first call.
+fn handle() -> Result<&'static Handle, NoEventLoop> {
+    LOOP.get_or_init(start).as_ref().map_err(NoEventLoop)
+}
 
 /// Runs a future on the event loop, which is started with the first.
 ///
 /// # Errors
 /// The reason, if the system gives no thread or no descriptors for it.
-pub fn spawn(future: impl Future<Output = ()> + Send + 'static) -> Result<(), String> {
-    match LOOP.get_or_init(start) {
-        Ok(handle) => {
-            handle.spawn(future);
-            Ok(())
-        }
-        Err(reason) => Err(reason.clone()),
-    }
+pub fn spawn(future: impl Future<Output = ()> + Send + 'static) -> Result<(), NoEventLoop> {
+    handle()?.spawn(future);
+    Ok(())
 }
 
 /// A future that waits only for others to wake it, and that can be stopped before its end.
@@ -41,8 +59,8 @@ pub(crate) trait Stoppable: Future<Output = ()> + Send + Unpin + 'static {
 ///
 /// # Errors
 /// As [`spawn`].
-pub(crate) fn begin<F: Stoppable>(future: F) -> Result<(), String> {
-    let handle = LOOP.get_or_init(start).as_ref().map_err(String::clone)?;
+pub(crate) fn begin<F: Stoppable>(future: F) -> Result<(), NoEventLoop> {
+    let handle = handle()?;
     let begun = Arc::new(BegunFuture(Mutex::new(FutureStage::RUNS)));
     begun.run(handle, future, true);
     Ok(())
@@ -171,11 +189,11 @@ impl<F: Stoppable> Wake for BegunFuture<F> {
     }
 }
 
-fn start() -> Result<Handle, String> {
-    let runtime = Builder::new_current_thread().enable_all().build().map_err(|error| error.to_string())?;
+fn start() -> io::Result<Handle> {
+    let runtime = Builder::new_current_thread().enable_all().build()?;
     let handle = runtime.handle().clone();
     let run = move || runtime.block_on(std::future::pending::<()>());
-    std::thread::Builder::new().name("world".into()).spawn(run).map_err(|error| error.to_string())?;
+    std::thread::Builder::new().name("world".into()).spawn(run)?;
     Ok(handle)
 }
 

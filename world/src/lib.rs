@@ -39,10 +39,10 @@ mod watch;
 
 use esl_vm::vm::Vm;
 
-pub use event_loop::spawn;
+pub use event_loop::{NoEventLoop, spawn};
 pub use modules::{module, module_names};
 #[cfg(feature = "tls")]
-pub use tls::{TlsIdentity, begin_tls};
+pub use tls::{PemFault, TlsError, TlsIdentity, begin_tls};
 
 /// Gives a machine the modules, for `require`, and what they need of the process itself.
 pub fn install_modules(machine: &mut Vm) {

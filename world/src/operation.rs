@@ -11,7 +11,7 @@ use esl_vm::vm::Vm;
 use tokio::sync::oneshot;
 
 use crate::data::{CallArguments, failure};
-use crate::event_loop::{self, Stoppable};
+use crate::event_loop::{self, NoEventLoop, Stoppable};
 
 /// What an operation comes to.
 pub(crate) type Completion = Result<Vec<Datum>, HostFailure>;
@@ -159,9 +159,9 @@ fn listen(operation: &HostOperation) -> oneshot::Receiver<()> {
 
 fn add<F>(machine: &mut Vm, name: &str, needs: &[Need], mut begin: F)
 where
-    F: FnMut(HostOperation) -> Result<(), String> + Send + 'static,
+    F: FnMut(HostOperation) -> Result<(), NoEventLoop> + Send + 'static,
 {
     // Without the event loop the operation is dropped, which is how the program hears of it.
-    let begin = move |operation: HostOperation| drop(begin(operation));
+    let begin = move |operation: HostOperation| _ = begin(operation);
     machine.add_guarded_function(name, HostFunction::Operation(Box::new(begin)), needs);
 }

@@ -1,7 +1,9 @@
 //! TLS for connections: rustls, with the certificates that the system trusts or those of a file; for
 //! listeners, with one of their own.
 
-use std::path::Path;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use esl_vm::host::HostFailure;
@@ -10,8 +12,8 @@ use tokio::net::TcpStream;
 use tokio_rustls::client::TlsStream;
 use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::pki_types::pem::{self, PemObject};
-use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
-use tokio_rustls::rustls::{ClientConfig, RootCertStore, ServerConfig};
+use tokio_rustls::rustls::pki_types::{CertificateDer, InvalidDnsNameError, PrivateKeyDer, ServerName};
+use tokio_rustls::rustls::{self, ClientConfig, RootCertStore, ServerConfig};
 use tokio_rustls::{TlsAcceptor, TlsConnector};
 
 use crate::data::failure;
@@ -20,38 +22,124 @@ fn tls_failure(reason: impl ToString) -> HostFailure {
     failure("TLS-ERROR", reason)
 }
 
+/// Reason why a connection could not be secured.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum TlsError {
+    /// The system has no certificates to trust.
+    NothingTrusted,
+    /// The certificates of this file, which are to be trusted, cannot be used.
+    Trusted(PathBuf, PemFault),
+    /// This file of the certificates or the key of one's own cannot be used.
+    Own(PathBuf, PemFault),
+    /// The server cannot have this name.
+    Name(InvalidDnsNameError),
+    /// TLS cannot be set up.
+    Setup(rustls::Error),
+    /// The peer does not prove who it is, or the connection ends.
+    Connection(io::Error),
+}
+
+/// What is wrong with a file of certificates or keys in PEM.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum PemFault {
+    /// The file cannot be read, or is no PEM.
+    Unreadable(pem::Error),
+    /// The file has no certificate.
+    NoCertificate,
+    /// The file has no private key.
+    NoKey,
+    /// Its contents cannot be used, or do not belong together.
+    Refused(rustls::Error),
+}
+
+impl fmt::Display for TlsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TlsError::NothingTrusted => {
+                f.write_str("the system has no certificates to trust; `:ca-file` names others")
+            }
+            TlsError::Trusted(path, fault) => {
+                write!(f, "the certificates of `{}`: {fault}", path.display())
+            }
+            TlsError::Own(path, fault) => write!(f, "`{}`: {fault}", path.display()),
+            TlsError::Name(error) => error.fmt(f),
+            TlsError::Setup(error) => error.fmt(f),
+            TlsError::Connection(error) => error.fmt(f),
+        }
+    }
+}
+
+impl fmt::Display for PemFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PemFault::Unreadable(error) => error.fmt(f),
+            PemFault::NoCertificate => f.write_str("there is no certificate in it"),
+            PemFault::NoKey => f.write_str("there is no private key in it"),
+            PemFault::Refused(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for TlsError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            TlsError::NothingTrusted => None,
+            TlsError::Trusted(_, fault) | TlsError::Own(_, fault) => Some(fault),
+            TlsError::Name(error) => Some(error),
+            TlsError::Setup(error) => Some(error),
+            TlsError::Connection(error) => Some(error),
+        }
+    }
+}
+
+impl std::error::Error for PemFault {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            PemFault::Unreadable(error) => Some(error),
+            PemFault::NoCertificate | PemFault::NoKey => None,
+            PemFault::Refused(error) => Some(error),
+        }
+    }
+}
+
 /// Returns what clients need that trust these certificates.
-fn config_with(roots: RootCertStore) -> Result<Arc<ClientConfig>, String> {
+fn config_with(roots: RootCertStore) -> Result<Arc<ClientConfig>, TlsError> {
     let builder = ClientConfig::builder_with_provider(Arc::new(ring::default_provider()));
-    let builder = builder.with_safe_default_protocol_versions().map_err(|error| error.to_string())?;
+    let builder = builder.with_safe_default_protocol_versions().map_err(TlsError::Setup)?;
     Ok(Arc::new(builder.with_root_certificates(roots).with_no_client_auth()))
 }
 
-/// Returns what clients need that trust what the system trusts. It is read once.
-fn config_of_system() -> Result<Arc<ClientConfig>, String> {
-    static CONFIG: OnceLock<Result<Arc<ClientConfig>, String>> = OnceLock::new();
-    let make = || {
-        let mut roots = RootCertStore::empty();
-        let found = rustls_native_certs::load_native_certs();
-        // Systems have some that are not well-formed; only none at all is a fault.
-        if roots.add_parsable_certificates(found.certs).0 == 0 {
-            return Err("the system has no certificates to trust; `:ca-file` names others".into());
-        }
-        config_with(roots)
-    };
-    CONFIG.get_or_init(make).clone()
+/// Returns what clients need that trust what the system trusts. It is read until it can be used.
+fn config_of_system() -> Result<Arc<ClientConfig>, TlsError> {
+    static CONFIG: OnceLock<Arc<ClientConfig>> = OnceLock::new();
+    if let Some(config) = CONFIG.get() {
+        return Ok(config.clone());
+    }
+    let mut roots = RootCertStore::empty();
+    let found = rustls_native_certs::load_native_certs();
+    // Systems have some that are not well-formed; only none at all is a fault.
+    if roots.add_parsable_certificates(found.certs).0 == 0 {
+        return Err(TlsError::NothingTrusted);
+    }
+    let config = config_with(roots)?;
+    Ok(CONFIG.get_or_init(|| config).clone())
+}
+
+/// Reads certificates of a file, in PEM.
+fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, PemFault> {
+    let found = CertificateDer::pem_file_iter(path).map_err(PemFault::Unreadable)?;
+    let found = found.collect::<Result<Vec<_>, _>>().map_err(PemFault::Unreadable)?;
+    if found.is_empty() { Err(PemFault::NoCertificate) } else { Ok(found) }
 }
 
 /// Returns what clients need that trust the certificates of a file, in PEM.
-fn config_of_file(path: &Path) -> Result<Arc<ClientConfig>, String> {
-    let unread = |error: &dyn std::fmt::Display| format!("the certificates of `{}`: {error}", path.display());
+fn config_of_file(path: &Path) -> Result<Arc<ClientConfig>, TlsError> {
+    let refused = |fault| TlsError::Trusted(path.into(), fault);
     let mut roots = RootCertStore::empty();
-    for certificate in CertificateDer::pem_file_iter(path).map_err(|error| unread(&error))? {
-        let certificate = certificate.map_err(|error| unread(&error))?;
-        roots.add(certificate).map_err(|error| unread(&error))?;
-    }
-    if roots.is_empty() {
-        return Err(unread(&"there are none"));
+    for certificate in certificates(path).map_err(refused)? {
+        roots.add(certificate).map_err(|error| refused(PemFault::Refused(error)))?;
     }
     config_with(roots)
 }
@@ -67,21 +155,17 @@ pub(crate) async fn client_config(ca_file: Option<String>) -> Result<Arc<ClientC
 
 /// Reads what a listener needs that proves by the certificates of one file, in PEM, and the key of another,
 /// who it is.
-fn read_acceptor(certificate: &Path, key: &Path) -> Result<TlsAcceptor, String> {
-    let unread = |path: &Path, error: &dyn std::fmt::Display| format!("`{}`: {error}", path.display());
-    let chain = CertificateDer::pem_file_iter(certificate).map_err(|error| unread(certificate, &error))?;
-    let chain = chain.collect::<Result<Vec<_>, _>>().map_err(|error| unread(certificate, &error))?;
-    if chain.is_empty() {
-        return Err(unread(certificate, &"there is no certificate in it"));
-    }
+fn read_acceptor(certificate: &Path, key: &Path) -> Result<TlsAcceptor, TlsError> {
+    let chain = certificates(certificate).map_err(|fault| TlsError::Own(certificate.into(), fault))?;
+    let wrong_key = |fault| TlsError::Own(key.into(), fault);
     let private = PrivateKeyDer::from_pem_file(key).map_err(|error| match error {
-        pem::Error::NoItemsFound => unread(key, &"there is no private key in it"),
-        error => unread(key, &error),
+        pem::Error::NoItemsFound => wrong_key(PemFault::NoKey),
+        error => wrong_key(PemFault::Unreadable(error)),
     })?;
     let builder = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()));
-    let builder = builder.with_safe_default_protocol_versions().map_err(|error| error.to_string())?;
+    let builder = builder.with_safe_default_protocol_versions().map_err(TlsError::Setup)?;
     let config = builder.with_no_client_auth().with_single_cert(chain, private);
-    Ok(TlsAcceptor::from(Arc::new(config.map_err(|error| unread(key, &error))?)))
+    Ok(TlsAcceptor::from(Arc::new(config.map_err(|error| wrong_key(PemFault::Refused(error)))?)))
 }
 
 /// Returns the same, read where nobody waits for it.
@@ -99,7 +183,7 @@ impl TlsIdentity {
     ///
     /// # Errors
     /// What is wrong with them.
-    pub fn read(certificate: &Path, key: &Path) -> Result<TlsIdentity, String> {
+    pub fn read(certificate: &Path, key: &Path) -> Result<TlsIdentity, TlsError> {
         read_acceptor(certificate, key).map(TlsIdentity)
     }
 
@@ -110,7 +194,7 @@ impl TlsIdentity {
     pub async fn accept<S: AsyncRead + AsyncWrite + Unpin>(
         &self,
         stream: S,
-    ) -> std::io::Result<tokio_rustls::server::TlsStream<S>> {
+    ) -> io::Result<tokio_rustls::server::TlsStream<S>> {
         self.0.accept(stream).await
     }
 }
@@ -124,11 +208,18 @@ pub async fn begin_tls<S: AsyncRead + AsyncWrite + Unpin>(
     stream: S,
     name: &str,
     ca_file: Option<&Path>,
-) -> Result<TlsStream<S>, String> {
-    let config = ca_file.map_or_else(config_of_system, config_of_file)?;
-    let name = ServerName::try_from(name.trim_matches(['[', ']']).to_owned());
-    let name = name.map_err(|error| error.to_string())?;
-    TlsConnector::from(config).connect(name, stream).await.map_err(|error| error.to_string())
+) -> Result<TlsStream<S>, TlsError> {
+    connect(ca_file.map_or_else(config_of_system, config_of_file)?, stream, name).await
+}
+
+/// Begins TLS over a connection to the server of this name, by what its client needs.
+async fn connect<S: AsyncRead + AsyncWrite + Unpin>(
+    config: Arc<ClientConfig>,
+    stream: S,
+    name: &str,
+) -> Result<TlsStream<S>, TlsError> {
+    let name = ServerName::try_from(name.trim_matches(['[', ']']).to_owned()).map_err(TlsError::Name)?;
+    TlsConnector::from(config).connect(name, stream).await.map_err(TlsError::Connection)
 }
 
 /// Begins TLS over a connection to the server of this name, which has to prove that it is that.
@@ -137,8 +228,5 @@ pub(crate) async fn begin(
     name: &str,
     ca_file: Option<String>,
 ) -> Result<TlsStream<TcpStream>, HostFailure> {
-    let config = client_config(ca_file).await?;
-    let name = name.trim_matches(['[', ']']).to_owned();
-    let name = ServerName::try_from(name).map_err(tls_failure)?;
-    TlsConnector::from(config).connect(name, stream).await.map_err(tls_failure)
+    connect(client_config(ca_file).await?, stream, name).await.map_err(tls_failure)
 }

@@ -29,8 +29,10 @@
 //! 2503.16971). We differ in writing no byte when allocating, and in treating all that was allocated while
 //! marking as one extent.
 
-use crate::list_state;
+use std::fmt;
 use std::ops::Range;
+
+use crate::list_state;
 
 /// Mask of the epoch's bits.
 pub(super) const EPOCH: u8 = 3;
@@ -50,11 +52,11 @@ pub(super) const fn next_epoch(epoch: u8) -> u8 {
 
 /// Result of sweeping a block, in granules.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
-pub(super) struct SweepCounts {
+pub struct SweepCounts {
     /// Number of granules outside of extents.
-    pub(super) free: usize,
+    pub free: usize,
     /// Length of the longest hole.
-    pub(super) largest: usize,
+    pub largest: usize,
 }
 
 list_state! { SweepCounts { free: Run, largest: Run } }
@@ -161,13 +163,30 @@ pub(super) fn next_gray(bytes: &[u8], from: usize) -> Option<usize> {
     None
 }
 
+/// A byte of a block's metadata that a sweep would change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotCanonical {
+    /// The granule, from the beginning of the block.
+    pub granule: usize,
+    /// Its byte.
+    pub found: u8,
+    /// The byte that a sweep leaves.
+    pub canonical: u8,
+}
+
+impl fmt::Display for NotCanonical {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "granule {}: {:#x}, canonical is {:#x}", self.granule, self.found, self.canonical)
+    }
+}
+
 /// Checks that a block is canonical for `epoch`, and returns the counts of a sweep.
-pub(super) fn check_canonical(bytes: &[u8], epoch: u8) -> Result<SweepCounts, String> {
+pub(super) fn check_canonical(bytes: &[u8], epoch: u8) -> Result<SweepCounts, NotCanonical> {
     let mut copy = bytes.to_vec();
     let summary = sweep(&mut copy, epoch, |_| {});
     match bytes.iter().zip(&copy).position(|(is, should)| is != should) {
         None => Ok(summary),
-        Some(at) => Err(format!("granule {at}: {:#x}, canonical is {:#x}", bytes[at], copy[at])),
+        Some(granule) => Err(NotCanonical { granule, found: bytes[granule], canonical: copy[granule] }),
     }
 }
 

@@ -6,7 +6,7 @@
 //! mark      incremental marking                          sweep     lazy sweeping
 //! arena     1 MiB pieces of memory, in blocks            large     big objects, one by one
 //! metadata  one byte per granule                     external  memory outside that counts against the limit
-//! image     the contents at a time, to be had again
+//! image     the contents at a time, to be had again  check     contradictions, for tests
 //! ```
 //!
 //! Objects never move. A cycle of the collector marks what is reachable, in slices between which the program
@@ -54,6 +54,7 @@ pub mod layout;
 mod access;
 mod alloc;
 mod arena;
+mod check;
 mod external;
 mod image;
 mod large;
@@ -64,9 +65,11 @@ mod sweep;
 
 pub use access::BignumRef;
 pub use alloc::AllocError;
+pub use check::HeapContradiction;
 pub use external::Holder;
 pub use image::HeapImage;
 pub use layout::Kind;
+pub use metadata::{NotCanonical, SweepCounts};
 pub use object::CodeParts;
 
 use crate::list_state;

@@ -10,7 +10,6 @@
 use super::alloc::PIECE;
 use super::arena::{ARENA, BLOCKS, BlockState};
 use super::layout::GRANULE;
-use super::metadata::check_canonical;
 use super::{Heap, Phase, SliceOutcome};
 use crate::list_state;
 
@@ -146,57 +145,5 @@ impl Heap {
         if let Some(moved) = self.large.get_mut(index) {
             moved.header_mut().index = index;
         }
-    }
-
-    /// Checks the metadata and the counts for contradictions, for tests. Blocks still to be swept are left
-    /// out.
-    ///
-    /// # Errors
-    /// The contradiction.
-    pub fn check(&self) -> Result<(), String> {
-        let mut committed = 0;
-        for (number, arena) in self.arenas.iter().enumerate() {
-            let Some(arena) = arena else { continue };
-            committed += ARENA;
-            if arena.header().number as usize != number {
-                return Err(format!("arena {number} says it is {}", arena.header().number));
-            }
-            for block in 1..=BLOCKS {
-                let is = arena.block(block);
-                if is.state == BlockState::Unswept && self.phase != Phase::Sweeping {
-                    return Err(format!("arena {number} block {block} was left out of the sweep"));
-                }
-                if is.state != BlockState::Swept || self.phase == Phase::Marking {
-                    continue;
-                }
-                match check_canonical(arena.metadata(block), self.epoch) {
-                    Ok(counts) if counts == is.counts => {}
-                    Ok(counts) => {
-                        return Err(format!("arena {number} block {block}: {:?} is {counts:?}", is.counts));
-                    }
-                    Err(e) => return Err(format!("arena {number} block {block}: {e}")),
-                }
-            }
-        }
-        for (index, large) in self.large.iter().enumerate() {
-            committed += large.header().bytes;
-            if large.header().index != index {
-                return Err(format!("large object {index} says it is {}", large.header().index));
-            }
-        }
-        if committed != self.committed {
-            return Err(format!("{committed} bytes are taken, {} noted", self.committed));
-        }
-        let wants_slice = match self.phase {
-            Phase::Idle => self.pacing.since_cycle >= self.pacing.threshold,
-            Phase::Marking | Phase::Sweeping => self.pacing.owed >= PIECE as u64,
-        };
-        if self.due != wants_slice || self.marking != (self.phase == Phase::Marking) {
-            return Err("the flags for the fast paths do not follow from phase and pacing".into());
-        }
-        if !self.stats.live.is_multiple_of(GRANULE as u64) {
-            return Err("live bytes are not whole granules".into());
-        }
-        Ok(())
     }
 }

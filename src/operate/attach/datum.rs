@@ -5,6 +5,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::form::WireForm;
+use crate::operate::refusal::OperatorRefusal;
 
 /// Most lists within each other of an answer; deeper ones are left out.
 const DEPTH: usize = 50;
@@ -13,9 +14,9 @@ const DEPTH: usize = 50;
 ///
 /// # Errors
 /// Why it is no data.
-pub(in crate::operate) fn codes_of(text: &str) -> Result<Datum, String> {
-    let form =
-        WireForm::parse(&format!("({text})")).map_err(|reason| format!("`{text}` is no data: {reason}"))?;
+pub(in crate::operate) fn codes_of(text: &str) -> Result<Datum, OperatorRefusal> {
+    let form = WireForm::parse(&format!("({text})"))
+        .map_err(|reason| OperatorRefusal::NotData { text: text.into(), reason })?;
     Ok(list(form.items().unwrap_or_default().iter().map(code_of)))
 }
 

@@ -22,7 +22,7 @@ use std::time::Duration;
 use esl_bytecode::datum::DatumKind;
 use esl_vm::embed::HostFunction;
 use esl_vm::vm::Vm;
-use esl_world::TlsIdentity;
+use esl_world::{NoEventLoop, TlsIdentity};
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::sync::{Semaphore, mpsc};
 
@@ -30,6 +30,7 @@ pub(super) use datum::codes_of;
 pub(crate) use form::WireForm;
 pub(crate) use packet::{read, write};
 
+use super::refusal::OperatorRefusal;
 use super::scope::RunScope;
 use super::secrets::{OperatorRole, Secrets};
 use packet::LARGEST;
@@ -70,7 +71,7 @@ pub(super) enum Entrance {
 ///
 /// # Errors
 /// The reason, if there is no event loop.
-pub(super) fn serve(machine: &mut Vm, door: Entrance, scope: RunScope) -> Result<(), String> {
+pub(super) fn serve(machine: &mut Vm, door: Entrance, scope: RunScope) -> Result<(), NoEventLoop> {
     let outputs = SessionOutputs::default();
     let told = outputs.clone();
     let tell = move |arguments: &[esl_bytecode::datum::Datum]| {
@@ -116,7 +117,7 @@ fn written(text: &str) -> WireForm {
 fn too_large(form: &WireForm) -> WireForm {
     match form.items() {
         Some([kind, _, number]) if kind.name().as_deref() == Some(":return") => {
-            answer(Err("the answer is too large".into()), number.clone())
+            answer(Err(OperatorRefusal::AnswerTooLarge), number.clone())
         }
         _ => written("; what was to be told is too large\n"),
     }
@@ -284,7 +285,7 @@ async fn take_requests(
             Some(":emacs-rex") if items.len() >= 5 => {
                 let [form, package, thread, number] = [1, 2, 3, 4].map(|index| items[index].clone());
                 let Ok(permit) = room.clone().try_acquire_owned() else {
-                    let refusal = answer(Err("too many requests are under way".into()), number);
+                    let refusal = answer(Err(OperatorRefusal::TooManyRequests), number);
                     _ = answers.send(refusal).await;
                     continue;
                 };
@@ -319,10 +320,10 @@ async fn take_requests(
 }
 
 /// Returns the answer to the request with this number.
-fn answer(result: Result<WireForm, String>, number: WireForm) -> WireForm {
+fn answer(result: Result<WireForm, OperatorRefusal>, number: WireForm) -> WireForm {
     let result = match result {
         Ok(value) => WireForm::list([WireForm::symbol(":ok"), value]),
-        Err(reason) => WireForm::list([WireForm::symbol(":abort"), WireForm::Text(reason)]),
+        Err(reason) => WireForm::list([WireForm::symbol(":abort"), WireForm::Text(reason.to_string())]),
     };
     WireForm::list([WireForm::symbol(":return"), result, number])
 }

@@ -14,6 +14,7 @@ use esl_vm::host::{
 use super::datum::{boolean, codes_of, form_of, integer, list, string};
 use super::form::WireForm;
 use super::request::SessionRequest;
+use crate::operate::refusal::{NeededArgument, OperatorRefusal};
 use crate::operate::scope::RunScope;
 use crate::operate::secrets::OperatorRole;
 use crate::operate::slime::{self, SlimeCall, SlimeStep};
@@ -74,25 +75,26 @@ impl OperatorSession {
         form: &WireForm,
         package: &WireForm,
         thread: &WireForm,
-    ) -> Result<WireForm, String> {
+    ) -> Result<WireForm, OperatorRefusal> {
         let items = form.items().unwrap_or_default();
         let name = items.first().and_then(WireForm::name).unwrap_or_default();
         let arguments = items.get(1..).unwrap_or_default();
         let Some(request) = SessionRequest::named(&name) else {
             let Some((role, step)) = slime::step(&name, arguments) else {
-                return Err(format!("`{name}` is no request of a session"));
+                return Err(OperatorRefusal::UnknownRequest(name));
             };
             self.check(&name, role)?;
             return self.take_step(step?, package, thread).await;
         };
         self.check(&name, request.role())?;
+        let lacks = |needed| OperatorRefusal::Argument { request: name.clone(), needed };
         let number = || {
             let number = arguments.first().and_then(WireForm::as_integer).and_then(|n| u64::try_from(n).ok());
-            number.filter(|&number| number > 0).ok_or_else(|| format!("`{name}` needs the number of a task"))
+            number.filter(|&number| number > 0).ok_or_else(|| lacks(NeededArgument::TaskNumber))
         };
         let text = |index: usize| {
             let text = arguments.get(index).and_then(WireForm::as_text);
-            text.ok_or_else(|| format!("`{name}` needs a string as argument {}", index + 1))
+            text.ok_or_else(|| lacks(NeededArgument::Text(index)))
         };
         match request {
             SessionRequest::Connect => Ok(self.description()),
@@ -134,8 +136,7 @@ impl OperatorSession {
                 self.call("%SESSION-SIGNAL", vec![string(&text(0)?.to_uppercase()), data]).await
             }
             SessionRequest::Narrow => {
-                let rights =
-                    rights_of(arguments).ok_or_else(|| format!("`{name}` needs pairs of strings"))?;
+                let rights = rights_of(arguments).ok_or_else(|| lacks(NeededArgument::Pairs))?;
                 self.call("%SESSION-NARROW", vec![integer(self.number as i64), rights]).await
             }
             SessionRequest::Evaluate => self.call_in("%SESSION-EVALUATE", &[text(0)?]).await,
@@ -154,11 +155,11 @@ impl OperatorSession {
     }
 
     /// Refuses a request for which the role of this session is not enough.
-    fn check(&self, name: &str, role: OperatorRole) -> Result<(), String> {
+    fn check(&self, name: &str, role: OperatorRole) -> Result<(), OperatorRefusal> {
         if self.role >= role {
             return Ok(());
         }
-        Err(format!("`{name}` needs the role {role}, and this session has {}", self.role))
+        Err(OperatorRefusal::Role { request: name.into(), needed: role, held: self.role })
     }
 
     /// Does what SLIME has asked for.
@@ -167,7 +168,7 @@ impl OperatorSession {
         step: SlimeStep,
         package: &WireForm,
         thread: &WireForm,
-    ) -> Result<WireForm, String> {
+    ) -> Result<WireForm, OperatorRefusal> {
         match step {
             SlimeStep::Answer(answer) => Ok(answer),
             SlimeStep::Tasks => {
@@ -192,8 +193,8 @@ impl OperatorSession {
         self.table.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn task_in_row(&self, row: usize) -> Result<u64, String> {
-        self.table().get(row).copied().ok_or_else(|| format!("there is no row {row} in the table of tasks"))
+    fn task_in_row(&self, row: usize) -> Result<u64, OperatorRefusal> {
+        self.table().get(row).copied().ok_or(OperatorRefusal::NoRow(row))
     }
 
     /// Calls a function of the library for SLIME. A failure is an error: what it says first.
@@ -202,7 +203,7 @@ impl OperatorSession {
         call: SlimeCall,
         package: &WireForm,
         thread: &WireForm,
-    ) -> Result<WireForm, String> {
+    ) -> Result<WireForm, OperatorRefusal> {
         let arguments = match call.task {
             Some(row) => vec![integer(self.task_in_row(row)? as i64)],
             None => call.arguments,
@@ -218,12 +219,12 @@ impl OperatorSession {
         ];
         let mut answer = self.call("%SLIME-REQUEST", arguments).await?;
         if answer.name().as_deref() == Some(":left") {
-            return Err("the task has left".into());
+            return Err(OperatorRefusal::Left);
         }
         if let Some([kind, WireForm::Text(report)]) = answer.items()
             && kind.name().as_deref() == Some(":failed")
         {
-            return Err(report.lines().next().unwrap_or_default().to_string());
+            return Err(OperatorRefusal::Failed(report.lines().next().unwrap_or_default().to_string()));
         }
         slime::settle(&mut answer);
         Ok(answer)
@@ -275,24 +276,27 @@ impl OperatorSession {
         ])
     }
 
-    fn sender(&self) -> Result<&Sender, String> {
-        self.sender.as_ref().ok_or_else(|| "this session may only look".into())
+    fn sender(&self) -> Result<&Sender, OperatorRefusal> {
+        self.sender.as_ref().ok_or(OperatorRefusal::LooksOnly)
     }
 
-    async fn look(&self, request: SurveyRequest) -> Result<esl_vm::host::Survey, String> {
-        self.scope.survey(request).await.ok_or_else(|| "the machine does not answer".into())
+    async fn look(&self, request: SurveyRequest) -> Result<esl_vm::host::Survey, OperatorRefusal> {
+        self.scope.survey(request).await.ok_or(OperatorRefusal::Silent)
     }
 
     /// Returns what there is to say of a task that has not ended, and its frames.
-    async fn task(&self, number: u64) -> Result<(SurveyedTask, Vec<esl_vm::host::FrameRow>), String> {
+    async fn task(
+        &self,
+        number: u64,
+    ) -> Result<(SurveyedTask, Vec<esl_vm::host::FrameRow>), OperatorRefusal> {
         let request =
             SurveyRequest { named: vec![number], frames_of: Some(number), ..SurveyRequest::default() };
         let survey = self.look(request).await?;
         let row = survey.tasks.into_iter().next();
-        row.map(|row| (row, survey.frames)).ok_or_else(|| format!("there is no task {number}"))
+        row.map(|row| (row, survey.frames)).ok_or(OperatorRefusal::NoTask(number))
     }
 
-    async fn backtrace(&self, number: u64) -> Result<WireForm, String> {
+    async fn backtrace(&self, number: u64) -> Result<WireForm, OperatorRefusal> {
         let (row, frames) = self.task(number).await?;
         let state = row.waits_for.map_or("can run".into(), |reason| format!("waits for {reason}"));
         let mut text = format!("{} {state}, {} ticks\n", row.name, row.ticks);
@@ -304,7 +308,7 @@ impl OperatorSession {
         Ok(WireForm::Text(text))
     }
 
-    async fn facts(&self, arguments: &[WireForm]) -> Result<WireForm, String> {
+    async fn facts(&self, arguments: &[WireForm]) -> Result<WireForm, OperatorRefusal> {
         let name = arguments.first().and_then(WireForm::as_text).unwrap_or_default().to_uppercase();
         let from = arguments.get(1).and_then(WireForm::as_integer).and_then(|n| usize::try_from(n).ok());
         let from = from.unwrap_or(0);
@@ -322,7 +326,7 @@ impl OperatorSession {
         Ok(WireForm::Text(text))
     }
 
-    async fn data(&self) -> Result<WireForm, String> {
+    async fn data(&self) -> Result<WireForm, OperatorRefusal> {
         let survey = self.look(SurveyRequest { data: true, ..SurveyRequest::default() }).await?;
         let mut text = String::new();
         for row in &survey.relations {
@@ -348,7 +352,7 @@ impl OperatorSession {
         }))
     }
 
-    async fn failures(&self) -> Result<WireForm, String> {
+    async fn failures(&self) -> Result<WireForm, OperatorRefusal> {
         let survey = self.look(SurveyRequest { failures_after: Some(0), ..SurveyRequest::default() }).await?;
         let mut text = String::new();
         for row in survey.failures {
@@ -364,7 +368,7 @@ impl OperatorSession {
 
     /// Calls a function of the library with the number of this session, these texts, and the ticks that it
     /// may use.
-    async fn call_in(&self, function: &str, texts: &[&str]) -> Result<WireForm, String> {
+    async fn call_in(&self, function: &str, texts: &[&str]) -> Result<WireForm, OperatorRefusal> {
         let mut arguments = vec![integer(self.number as i64)];
         arguments.extend(texts.iter().map(|text| string(text)));
         arguments.push(integer(TICKS));
@@ -372,7 +376,7 @@ impl OperatorSession {
     }
 
     /// Calls a function of the library. A failure is an answer, too: its report.
-    async fn call(&self, function: &str, arguments: Vec<Datum>) -> Result<WireForm, String> {
+    async fn call(&self, function: &str, arguments: Vec<Datum>) -> Result<WireForm, OperatorRefusal> {
         let pending = self.sender()?.ask(call(function, arguments));
         let number = pending.number();
         self.open().insert(number);
@@ -383,10 +387,10 @@ impl OperatorSession {
             Answer::Failed { report, .. } => {
                 Ok(WireForm::list([WireForm::symbol(":failed"), WireForm::Text(report)]))
             }
-            Answer::Aborted => Err("aborted".into()),
-            Answer::Circular | Answer::TooLarge => Err("the value is too large".into()),
-            Answer::Ended => Err("the run has ended".into()),
-            Answer::Tasks(_) => Err("it has another answer".into()),
+            Answer::Aborted => Err(OperatorRefusal::Aborted),
+            Answer::Circular | Answer::TooLarge => Err(OperatorRefusal::ValueTooLarge),
+            Answer::Ended => Err(OperatorRefusal::Ended),
+            Answer::Tasks(_) => Err(OperatorRefusal::OtherAnswer),
         }
     }
 }

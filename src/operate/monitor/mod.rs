@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use esl_bytecode::datum::Datum;
 use esl_vm::host::{Answer, FrameVariable, FunctionRef, Incoming, Question, Sender, SurveyRequest};
-use esl_world::TlsIdentity;
+use esl_world::{NoEventLoop, TlsIdentity};
 use http_body_util::{BodyExt, Channel, Limited};
 use hyper::header::{CONTENT_SECURITY_POLICY, HeaderValue, REFERRER_POLICY};
 use hyper::{Request, Response, StatusCode};
@@ -27,6 +27,7 @@ use tokio::sync::{Notify, watch};
 
 use super::attach::datum::{boolean, integer, string};
 use super::http::{self, Hangup, HttpBody, plain, with};
+use super::refusal::OperatorRefusal;
 use super::scope::RunScope;
 use super::secrets::{OperatorRole, Secrets};
 use model::{RunModel, ViewerView};
@@ -73,7 +74,7 @@ pub(super) fn serve(
     identity: Option<TlsIdentity>,
     scope: RunScope,
     secrets: Secrets,
-) -> Result<(), String> {
+) -> Result<(), NoEventLoop> {
     let is_secured = identity.is_some();
     let monitor = Arc::new(MonitorState {
         scope,
@@ -146,7 +147,7 @@ async fn answer(
             };
             let (status, text) = match done {
                 Ok(()) => (StatusCode::OK, json!({ "ok": true })),
-                Err(reason) => (StatusCode::CONFLICT, json!({ "ok": false, "reason": reason })),
+                Err(reason) => (StatusCode::CONFLICT, json!({ "ok": false, "reason": reason.to_string() })),
             };
             with(status, "application/json", text.to_string())
         }
@@ -293,7 +294,7 @@ fn set_view(monitor: &MonitorState, viewer: &str, wanted: ViewerView) -> Respons
 ///
 /// # Errors
 /// Why it was not done.
-async fn act(monitor: &MonitorState, deed: MonitorDeed) -> Result<(), String> {
+async fn act(monitor: &MonitorState, deed: MonitorDeed) -> Result<(), OperatorRefusal> {
     let sender = monitor.scope.sender();
     match deed {
         MonitorDeed::Abort(task) => sender.inbox().put(Incoming::Abort(task)),
@@ -312,14 +313,14 @@ async fn act(monitor: &MonitorState, deed: MonitorDeed) -> Result<(), String> {
 /// Calls a function of the library.
 ///
 /// # Errors
-/// The text of its failure.
-async fn call(sender: &Sender, function: &str, arguments: Vec<Datum>) -> Result<(), String> {
+/// Its failure, or that it was not done.
+async fn call(sender: &Sender, function: &str, arguments: Vec<Datum>) -> Result<(), OperatorRefusal> {
     let function = FunctionRef::Named(format!("ESL::{function}"));
     let pending = sender.ask(Question::Call { function, arguments, is_urgent: true });
     match tokio::time::timeout(5 * PATIENCE, pending).await {
         Ok(Answer::Values(_)) => Ok(()),
-        Ok(Answer::Failed { message, .. }) => Err(message),
-        Ok(_) => Err("it was not done".into()),
-        Err(_) => Err("the run has not done it yet".into()),
+        Ok(Answer::Failed { message, .. }) => Err(OperatorRefusal::Failed(message)),
+        Ok(_) => Err(OperatorRefusal::NotDone),
+        Err(_) => Err(OperatorRefusal::Late),
     }
 }

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::model::{ROWS, ViewerView};
 use crate::operate::attach::codes_of;
+use crate::operate::refusal::OperatorRefusal;
 use crate::operate::secrets::{OperatorRole, Secrets};
 
 /// What the head of a request asks for, by somebody who may.
@@ -41,7 +42,7 @@ pub(super) enum Wish {
     /// That this viewer sees something else.
     View { viewer: String, view: ViewerView },
     /// That something is done; why it cannot be.
-    Deed(Result<MonitorDeed, String>),
+    Deed(Result<MonitorDeed, OperatorRefusal>),
 }
 
 /// Returns what the head of a request asks for, if who asks may.
@@ -129,8 +130,8 @@ pub(super) fn wish(role: OperatorRole, is_view: bool, body: &[u8]) -> Result<Wis
 ///
 /// # Errors
 /// Why it cannot be.
-fn deed(value: &Value) -> Result<MonitorDeed, String> {
-    let task = || value["task"].as_u64().filter(|&n| n > 0).ok_or("it needs the number of a task");
+fn deed(value: &Value) -> Result<MonitorDeed, OperatorRefusal> {
+    let task = || value["task"].as_u64().filter(|&n| n > 0).ok_or(OperatorRefusal::NoNumber);
     Ok(match value["action"].as_str().unwrap_or_default() {
         "abort" => MonitorDeed::Abort(task()?),
         "pause" => MonitorDeed::Pause(true),
@@ -141,7 +142,7 @@ fn deed(value: &Value) -> Result<MonitorDeed, String> {
             let name = value["input"].as_str().unwrap_or_default().to_uppercase();
             MonitorDeed::Signal(name, codes_of(value["data"].as_str().unwrap_or_default())?)
         }
-        _ => return Err("there is no such action".into()),
+        _ => return Err(OperatorRefusal::UnknownAction),
     })
 }
 

@@ -17,11 +17,15 @@ use esl_vm::host::SurveyedTask;
 
 use super::attach::WireForm;
 use super::attach::datum::{boolean, integer, list, string};
+use super::refusal::{NeededArgument, OperatorRefusal};
 use super::secrets::OperatorRole;
 use request::{SlimeAnswer, SlimeRequest};
 
 /// Version of the protocol: SLIME asks its user if it has another one.
 pub(super) const VERSION: &str = "2.27";
+
+/// The one function that a request may be told to call for each of some rows.
+const MAPPED: &str = "swank:kill-nth-thread";
 
 /// What is to be done for a request of SLIME.
 pub(super) enum SlimeStep {
@@ -48,17 +52,23 @@ pub(super) struct SlimeCall {
 }
 
 /// Returns the role that a request needs, and what is to be done for it; `None` if SLIME has no such request.
-pub(super) fn step(name: &str, arguments: &[WireForm]) -> Option<(OperatorRole, Result<SlimeStep, String>)> {
+pub(super) fn step(
+    name: &str,
+    arguments: &[WireForm],
+) -> Option<(OperatorRole, Result<SlimeStep, OperatorRefusal>)> {
     let request = SlimeRequest::named(name)?;
     let number = |form: &WireForm| form.as_integer().and_then(|n| usize::try_from(n).ok());
-    let needs_row = || format!("`{name}` needs the row of a task");
+    let needs_row = || {
+        let needed = NeededArgument::TaskRow;
+        OperatorRefusal::Argument { request: name.into(), needed }
+    };
     let row = || arguments.first().and_then(number).ok_or_else(needs_row);
     let rows = || match arguments {
-        [function, rows] if unquoted(function).name().as_deref() == Some("swank:kill-nth-thread") => {
+        [function, rows] if unquoted(function).name().as_deref() == Some(MAPPED) => {
             let rows = unquoted(rows).items().unwrap_or_default();
             rows.iter().map(number).collect::<Option<Vec<usize>>>().ok_or_else(needs_row)
         }
-        _ => Err(format!("`{name}` is a request only for `swank:kill-nth-thread`")),
+        _ => Err(OperatorRefusal::Wraps { request: name.into(), only: MAPPED }),
     };
     let call = |function, task, is_evaluation| {
         let arguments = arguments.iter().map(datum_of).collect();
