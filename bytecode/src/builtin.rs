@@ -1189,9 +1189,9 @@ macro_rules! for_each_builtin {
             /// free.
             EndCompilation = eval::end_compilation, internal "%END-COMPILATION" ("handle");
             /// Reads a datum: whether there was one, or `:unfinished`; the datum; and the index after it.
-            ReadDatum = eval::read_from_string, internal "%READ-FROM-STRING" ("string &optional start end");
+            ReadDatum = reading::read_from_string, internal "%READ-FROM-STRING" ("string &optional start end");
             /// Reads a datum from a stream: whether there was one, or `:unfinished`; and the datum.
-            ReadStream = eval::read, internal "%READ" ("&optional stream") slowly "%SLOW-READ";
+            ReadStream = reading::read, internal "%READ" ("&optional stream") slowly "%SLOW-READ";
 
             // ---- JSON
             /// Reads the JSON value of a string that begins at `start`: the value, the index after it, and

@@ -24,6 +24,7 @@ mod lines;
 mod screen;
 mod terminal;
 mod typing;
+mod wire;
 
 use std::io::{IsTerminal, Write};
 use std::ops::ControlFlow::{self, Break, Continue};
@@ -38,10 +39,11 @@ use esl_vm::vm::{Config, Vm};
 use crate::command::{Interrupts, NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, complain, interrupt_on_signal};
 use crate::module_path::ModulePath;
 use crate::program;
-pub use attached::{AttachSecurity, attach};
+pub use attached::attach;
 use lines::Line;
 use screen::PromptScreen;
 use typing::Typing;
+pub use wire::AttachSecurity;
 
 /// Prompt for a form.
 const PROMPT: &str = "? ";

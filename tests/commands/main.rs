@@ -9,6 +9,7 @@ mod bad_input;
 mod browser;
 mod coverage;
 mod deadlock;
+mod editor;
 mod editors;
 mod examples;
 mod exploring;
@@ -26,6 +27,8 @@ mod monitor;
 #[cfg(unix)]
 mod mqtt;
 mod operate;
+#[cfg(unix)]
+mod patches;
 mod peers;
 #[cfg(unix)]
 mod playground;
@@ -38,6 +41,7 @@ mod rights;
 mod secured;
 #[cfg(unix)]
 mod slime;
+mod sockets;
 #[cfg(unix)]
 mod standing;
 mod streams;

@@ -38,12 +38,14 @@ mod error;
 mod fingerprint;
 mod function;
 mod image;
+mod record;
 mod whole;
 mod write;
 
 pub use error::{Problem, ReadError, WriteError};
 pub use fingerprint::{BUILTIN_TABLE, OPCODE_TABLE};
-pub use image::{ConstantRecord, ImageBytes, ModuleImage, PoolIndexes, SymbolHome, SymbolRecord};
+pub use image::{ImageBytes, ModuleImage};
+pub use record::{ConstantRecord, PoolIndexes, SymbolHome, SymbolRecord};
 pub use write::write;
 
 use crate::module::Module;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::image::{ConstantRecord, ModuleImage, SymbolHome, SymbolRecord};
+use super::image::ModuleImage;
+use super::record::{ConstantRecord, SymbolHome, SymbolRecord};
 use super::{Problem, ReadError, Section};
 use crate::module::{Constant, FunctionNumber, Module, PoolIdx};
 use crate::symbol::Symbol;

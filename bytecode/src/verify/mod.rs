@@ -83,6 +83,7 @@
 //! stack of labels).
 
 mod error;
+mod expect;
 mod flow;
 mod pool;
 mod registers;

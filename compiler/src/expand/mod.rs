@@ -103,6 +103,7 @@ mod scope;
 mod setf;
 mod standard_place;
 mod toplevel;
+mod values;
 mod variable;
 
 pub use chunk::{Chunk, Purpose};

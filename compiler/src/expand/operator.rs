@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 
 use super::expander::{Expander, Operator};
 use super::{
-    backquote, binding, call, control, define, destructure, handler, lambda, local, modify, recovery,
+    backquote, binding, call, control, define, destructure, handler, lambda, local, modify, recovery, values,
     variable,
 };
 
@@ -43,10 +43,10 @@ const STANDARD: &[(&str, Operator)] = &[
     ("LOCALLY", binding::locally),
     ("MACROLET", local::macrolet),
     ("MULTIPLE-VALUE-BIND", binding::multiple_value_bind),
-    ("MULTIPLE-VALUE-CALL", control::multiple_value_call),
-    ("MULTIPLE-VALUE-LIST", control::multiple_value_list),
+    ("MULTIPLE-VALUE-CALL", values::multiple_value_call),
+    ("MULTIPLE-VALUE-LIST", values::multiple_value_list),
     ("MULTIPLE-VALUE-PROG1", control::multiple_value_prog1),
-    ("MULTIPLE-VALUE-SETQ", control::multiple_value_setq),
+    ("MULTIPLE-VALUE-SETQ", values::multiple_value_setq),
     ("OR", control::or),
     ("POP", modify::pop),
     ("PROGN", control::progn),
@@ -68,7 +68,7 @@ const STANDARD: &[(&str, Operator)] = &[
     ("THE", control::the),
     ("THROW", control::throw),
     ("UNWIND-PROTECT", control::unwind_protect),
-    ("VALUES", control::values),
+    ("VALUES", values::values),
 ];
 
 /// The operators of the package `ESL`. A name that begins with `%` is internal to it.

@@ -11,22 +11,10 @@
 //! structure. These have setters of their own, or none.
 
 use super::Heap;
-use super::layout::{
-    Array, Bignum, Bytes, CodeObject, Cons, Float, FunctionObject, Header, Kind, StructureObject,
-    SymbolObject,
-};
+use super::layout::{Array, Cons, Float, Header, Kind, StructureObject, SymbolObject};
 use super::object::is_vouched_for;
 use crate::value::Value;
 use std::slice;
-
-/// Sign and magnitude of a bignum.
-#[derive(Copy, Clone, PartialEq, Eq, Debug)]
-pub struct BignumRef<'a> {
-    /// Whether the number is below zero.
-    pub negative: bool,
-    /// Magnitude in limbs of 64 bits, least first; the last one is not zero.
-    pub limbs: &'a [u64],
-}
 
 impl Heap {
     /// Returns the kind of an object; `None` for a cons and for a value without an address.
@@ -194,7 +182,7 @@ impl Heap {
     }
 
     #[inline(always)]
-    fn set_slot(&mut self, v: Value, kind: Kind, index: usize, new: Value) -> Option<()> {
+    pub(super) fn set_slot(&mut self, v: Value, kind: Kind, index: usize, new: Value) -> Option<()> {
         let object = self.object_of(v, kind)?;
         // SAFETY: H3: the kind is that of a record, which has `len` values after its header; `index` is below
         // that.
@@ -331,84 +319,6 @@ impl Heap {
         self.set_slot(v, Kind::Symbol, 5, new)
     }
 
-    /// Returns the code of a function.
-    #[inline(always)]
-    pub fn function_code(&self, v: Value) -> Option<Value> {
-        let object = self.object_of(v, Kind::Function)?;
-        // SAFETY: H3: the kind says that this is a Function.
-        Some(unsafe { (*object.cast::<FunctionObject>()).code })
-    }
-
-    /// Replaces the code of a function; `None` if `v` is not a function or `code` not a Code.
-    ///
-    /// # Safety
-    /// The old code of the function is not being executed, and the new code reads no capture that the
-    /// function lacks.
-    pub unsafe fn function_set_code(&mut self, v: Value, code: Value) -> Option<()> {
-        if !self.is(code, Kind::Code) {
-            return None;
-        }
-        self.set_slot(v, Kind::Function, 0, code)
-    }
-
-    /// Sets a constant of code; `None` if `v` is not a Code or has no such constant.
-    ///
-    /// # Safety
-    /// The code's words may run with the new constant: it is of the sort that they take for granted.
-    pub unsafe fn code_set_constant(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
-        let object = self.object_of(v, Kind::Code)?;
-        // SAFETY: H3: a Code has `nconsts` values at a fixed offset, and `index` is below that.
-        unsafe {
-            if index >= (*object.cast::<CodeObject>()).nconsts as usize {
-                return None;
-            }
-            self.store(object.byte_add(CodeObject::CONSTANTS_OFFSET).cast::<Value>().add(index), new);
-        }
-        Some(())
-    }
-
-    /// Returns the captures of a function.
-    pub fn function_captures(&self, v: Value) -> Option<&[Value]> {
-        self.record(v, Kind::Function).map(|slots| &slots[1..])
-    }
-
-    /// Sets a capture of a function; `None` if `v` is not a function or has no such capture.
-    ///
-    /// # Safety
-    /// The function's code may read the new value in place of the old one: a box where the capture is
-    /// declared as boxed.
-    pub unsafe fn function_set_capture(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
-        self.set_slot(v, Kind::Function, index.checked_add(1)?, new)
-    }
-
-    /// Returns the fixed part of code.
-    #[inline(always)]
-    pub fn code(&self, v: Value) -> Option<&CodeObject> {
-        let object = self.object_of(v, Kind::Code)?;
-        // SAFETY: H3: the kind says that this is a Code; H5: it is borrowed with the heap.
-        Some(unsafe { &*object.cast() })
-    }
-
-    /// Returns the constants of code.
-    pub fn code_constants(&self, v: Value) -> Option<&[Value]> {
-        let object = self.object_of(v, Kind::Code)?;
-        // SAFETY: H3: a Code has `nconsts` values at a fixed offset; H5: they are borrowed with the heap.
-        unsafe {
-            let n = (*object.cast::<CodeObject>()).nconsts as usize;
-            Some(slice::from_raw_parts(object.byte_add(CodeObject::CONSTANTS_OFFSET).cast(), n))
-        }
-    }
-
-    /// Returns the instruction words of code.
-    pub fn code_words(&self, v: Value) -> Option<&[u32]> {
-        let object = self.object_of(v, Kind::Code)?;
-        // SAFETY: H3: a Code has `nwords` words after its constants; H5: they are borrowed with the heap.
-        unsafe {
-            let code = &*object.cast::<CodeObject>();
-            Some(slice::from_raw_parts(object.byte_add(code.words_offset()).cast(), code.nwords as usize))
-        }
-    }
-
     // Arrays.
 
     /// Returns whether `v` may be the data of an array, or the array to which another is displaced.
@@ -466,12 +376,6 @@ impl Heap {
         })
     }
 
-    /// Returns sign and limbs of a bignum.
-    pub fn bignum(&self, v: Value) -> Option<BignumRef<'_>> {
-        let limbs = self.raw(v, Kind::Bignum)?;
-        Some(BignumRef { negative: self.header(v)?.flags & Bignum::NEGATIVE != 0, limbs })
-    }
-
     /// Returns numerator and denominator of a ratio.
     pub fn ratio(&self, v: Value) -> Option<(Value, Value)> {
         self.record(v, Kind::Ratio).map(|slots| (slots[0], slots[1]))
@@ -480,72 +384,6 @@ impl Heap {
     /// Returns real and imaginary part of a complex number.
     pub fn complex(&self, v: Value) -> Option<(Value, Value)> {
         self.record(v, Kind::Complex).map(|slots| (slots[0], slots[1]))
-    }
-
-    // Raw data.
-
-    /// Returns the code points of a string.
-    #[inline(always)]
-    pub fn string(&self, v: Value) -> Option<&[u32]> {
-        self.raw(v, Kind::String)
-    }
-
-    /// Returns the code points of a string, to be changed in place.
-    #[inline(always)]
-    pub fn string_mut(&mut self, v: Value) -> Option<&mut [u32]> {
-        self.raw_mut(v, Kind::String)
-    }
-
-    /// Returns the text of a string; U+FFFD stands for a code point that is not a Unicode scalar value.
-    pub fn string_text(&self, v: Value) -> Option<String> {
-        let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
-        Some(self.string(v)?.iter().map(text).collect())
-    }
-
-    /// Returns the elements of a Words32 object.
-    #[inline(always)]
-    pub fn words(&self, v: Value) -> Option<&[u32]> {
-        self.raw(v, Kind::Words32)
-    }
-
-    /// Returns the elements of a Words32 object, to be changed in place.
-    #[inline(always)]
-    pub fn words_mut(&mut self, v: Value) -> Option<&mut [u32]> {
-        self.raw_mut(v, Kind::Words32)
-    }
-
-    /// Returns the elements of a Bytes object.
-    pub fn bytes(&self, v: Value) -> Option<&[u8]> {
-        self.raw(v, Kind::Bytes)
-    }
-
-    /// Returns whether `v` is a Bytes object of bits.
-    pub fn is_bits(&self, v: Value) -> bool {
-        self.flags(v, Kind::Bytes).is_some_and(|flags| flags & Bytes::BITS != 0)
-    }
-
-    /// Returns the elements of a Bytes object, to be changed in place. The caller keeps bits bits.
-    pub fn bytes_mut(&mut self, v: Value) -> Option<&mut [u8]> {
-        self.raw_mut(v, Kind::Bytes)
-    }
-
-    /// Returns the elements of a raw object. `T` must be the integer of their size.
-    #[inline(always)]
-    fn raw<T: RawElement>(&self, v: Value, kind: Kind) -> Option<&[T]> {
-        debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
-        let object = self.object_of(v, kind)?;
-        // SAFETY: H3: a raw object has `len` elements of this size, of a type without invalid patterns; H5:
-        // they are borrowed with the heap.
-        Some(unsafe { slice::from_raw_parts(object.add(1).cast(), (*object).len as usize) })
-    }
-
-    #[inline(always)]
-    fn raw_mut<T: RawElement>(&mut self, v: Value, kind: Kind) -> Option<&mut [T]> {
-        debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
-        let object = self.object_of(v, kind)?;
-        // SAFETY: H3: a raw object has `len` elements of this size, of a type without invalid patterns; H5:
-        // the heap is borrowed mutably, so nobody else sees them.
-        Some(unsafe { slice::from_raw_parts_mut(object.add(1).cast(), (*object).len as usize) })
     }
 
     // Flags.
@@ -592,9 +430,3 @@ impl Heap {
         }
     }
 }
-
-/// An element of a raw object.
-trait RawElement: Copy {}
-impl RawElement for u8 {}
-impl RawElement for u32 {}
-impl RawElement for u64 {}

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! object    creating objects, a function per kind        access    checked reading and writing of objects
+//! raw       those without values, such as strings        code      those that run: functions and code
 //! layout    their form, to the byte                      alloc     bump allocation into holes
 //! mark      incremental marking                          sweep     lazy sweeping
 //! arena     1 MiB pieces of memory, in blocks            large     big objects, one by one
@@ -55,22 +56,24 @@ mod access;
 mod alloc;
 mod arena;
 mod check;
+mod code;
 mod external;
 mod image;
 mod large;
 mod mark;
 mod metadata;
 mod object;
+mod raw;
 mod sweep;
 
-pub use access::BignumRef;
 pub use alloc::AllocError;
 pub use check::HeapContradiction;
+pub use code::CodeParts;
 pub use external::Holder;
 pub use image::HeapImage;
 pub use layout::Kind;
 pub use metadata::{NotCanonical, SweepCounts};
-pub use object::CodeParts;
+pub use raw::BignumRef;
 
 use crate::list_state;
 use crate::state::StateSink;

@@ -6,33 +6,9 @@
 //!
 //! The functions assert the contents that the interpreter relies on (H4 in [`super`]).
 
-use super::layout::{
-    Bignum, Boxed, Bytes, CodeObject, Cons, Float, FunctionObject, Header, Kind, MAX_LENGTH, SymbolObject,
-    Vector,
-};
+use super::layout::{Boxed, Cons, Float, Header, Kind, MAX_LENGTH, SymbolObject, Vector};
 use super::{AllocError, Heap};
 use crate::value::Value;
-
-/// Parts of a Code object.
-#[derive(Copy, Clone, Debug)]
-pub struct CodeParts<'a> {
-    /// Name in a backtrace.
-    pub name: Value,
-    /// Debug information, or `nil`.
-    pub debug: Value,
-    /// Owner, or `nil`.
-    pub owner: Value,
-    /// Exact number of arguments, or [`CodeObject::ANY_ARITY`].
-    pub arity: u32,
-    /// Number of registers of a frame.
-    pub nregs: u32,
-    /// Two words of the caller's own, such as the number of captures.
-    pub spare: [u64; 2],
-    /// Constants.
-    pub constants: &'a [Value],
-    /// Instruction words. `entry` will be the first of them.
-    pub words: &'a [u32],
-}
 
 impl Heap {
     /// Creates a cons, if there is room in the current hole: the part of [`Heap::cons`] to inline into a hot
@@ -303,181 +279,9 @@ impl Heap {
         self.record_from(Kind::Symbol, flags, 0, &[], &slots)
     }
 
-    /// Creates a function: code with captured variables.
-    ///
-    /// # Safety
-    /// The captures are what the code reads: as many, and boxes where it declares them as boxed.
-    ///
-    /// # Panics
-    /// If `code` is not a Code.
-    pub unsafe fn alloc_function(&mut self, code: Value, captures: &[Value]) -> Result<Value, AllocError> {
-        assert_eq!(self.kind(code), Some(Kind::Code), "the code of a function is a Code");
-        self.record_from(Kind::Function, 0, 0, &[code], captures)
-    }
-
-    /// Creates a function for the interpreter, which fills in the captures: they start out `nil`.
-    ///
-    /// # Safety
-    /// `code` is a Code.
-    pub unsafe fn alloc_closure(
-        &mut self,
-        code: Value,
-        ncaptures: usize,
-    ) -> Result<*mut FunctionObject, AllocError> {
-        debug_assert_eq!(self.kind(code), Some(Kind::Code));
-        let function = self.begin_object(Kind::Function, 0, 0, 1 + ncaptures)?.cast::<FunctionObject>();
-        // SAFETY: `begin_object` gave room for the code and the captures; all are written before the address
-        // is given out.
-        unsafe {
-            (&raw mut (*function).code).write(code);
-            let captures = (&raw mut (*function).captures).cast::<Value>();
-            for i in 0..ncaptures {
-                captures.add(i).write(Value::NIL);
-            }
-        }
-        function.expose_provenance();
-        Ok(function)
-    }
-
-    /// Sets where code made from now on begins to run; `None` for its first word.
-    ///
-    /// # Safety
-    /// What stands there may run in place of any code, with its frame.
-    pub unsafe fn set_code_entry(&mut self, entry: Option<&'static u32>) {
-        self.code_entry = entry;
-    }
-
-    /// Creates code.
-    ///
-    /// # Safety
-    /// Words, constants, registers and arity have passed the verifier together, or were made by the VM to the
-    /// same rules: the interpreter runs them without a check.
-    pub unsafe fn alloc_code(&mut self, parts: CodeParts<'_>) -> Result<Value, AllocError> {
-        let (nconsts, nwords) = (parts.constants.len(), parts.words.len());
-        let len = CodeObject::len(nconsts, nwords);
-        if nconsts > MAX_LENGTH || nwords > MAX_LENGTH {
-            return Err(AllocError::TooLarge { requested: len.saturating_mul(8) });
-        }
-        let object = self.begin_object(Kind::Code, 0, 0, len)?;
-        let code = object.cast::<CodeObject>();
-        // SAFETY: `begin_object` gave room for `len` units of 8 bytes, which `CodeObject::len` computed for
-        // exactly these constants and words; everything is written before the value is made. Provenance is
-        // exposed because the interpreter walks from `entry` through the whole object.
-        unsafe {
-            let constants = (&raw mut (*code).constants).cast::<Value>();
-            let words = constants.add(nconsts).cast::<u32>();
-            code.write(CodeObject {
-                header: *object,
-                name: parts.name,
-                debug: parts.debug,
-                owner: parts.owner,
-                entry: self.code_entry.map_or(words.cast_const(), std::ptr::from_ref),
-                arity: parts.arity,
-                nregs: parts.nregs,
-                nconsts: nconsts as u32,
-                nwords: nwords as u32,
-                spare: parts.spare,
-                constants: [],
-            });
-            std::ptr::copy_nonoverlapping(parts.constants.as_ptr(), constants, nconsts);
-            std::ptr::copy_nonoverlapping(parts.words.as_ptr(), words, nwords);
-            Ok(Value::from_object(object))
-        }
-    }
-
-    /// Creates a string of these code points.
-    pub fn alloc_string(&mut self, characters: &[u32]) -> Result<Value, AllocError> {
-        self.raw_from(Kind::String, 0, characters)
-    }
-
-    /// Creates a string of `len` characters: those of `part(heap, 0)` and so on for `count` parts, and code
-    /// point 0 for what they lack.
-    pub fn alloc_string_of(
-        &mut self,
-        len: usize,
-        count: usize,
-        part: impl for<'a> Fn(&'a Heap, usize) -> &'a [u32],
-    ) -> Result<Value, AllocError> {
-        let object = self.begin_object(Kind::String, 0, 0, len)?;
-        // SAFETY: `begin_object` gave room for `len` code points, which nobody else can reach before the
-        // value is made; all are written by then.
-        unsafe {
-            let characters = object.add(1).cast::<u32>();
-            let mut written = 0;
-            for index in 0..count {
-                let part = part(self, index);
-                let fitting = part.len().min(len - written);
-                std::ptr::copy_nonoverlapping(part.as_ptr(), characters.add(written), fitting);
-                written += fitting;
-            }
-            for lacking in written..len {
-                characters.add(lacking).write(0);
-            }
-            Ok(Value::from_object(object))
-        }
-    }
-
-    /// Creates a string of `len` times the code point `fill`.
-    pub fn alloc_string_filled(&mut self, len: usize, fill: u32) -> Result<Value, AllocError> {
-        self.raw_filled(Kind::String, len, fill)
-    }
-
-    /// Creates a string with this text.
-    pub fn alloc_str(&mut self, text: &str) -> Result<Value, AllocError> {
-        let object = self.begin_object(Kind::String, 0, 0, text.chars().count())?;
-        // SAFETY: `begin_object` gave room for as many words as `text` has characters; they are written
-        // before the value is made.
-        unsafe {
-            let characters = object.add(1).cast::<u32>();
-            for (i, c) in text.chars().enumerate() {
-                characters.add(i).write(c as u32);
-            }
-            Ok(Value::from_object(object))
-        }
-    }
-
-    /// Creates a bignum. Leading zero limbs are cut off; the caller sees to it that the number is not a
-    /// fixnum.
-    pub fn alloc_bignum(&mut self, negative: bool, limbs: &[u64]) -> Result<Value, AllocError> {
-        let significant = limbs.iter().rposition(|&limb| limb != 0).map_or(0, |last| last + 1);
-        let flags = if negative { Bignum::NEGATIVE } else { 0 };
-        self.raw_from(Kind::Bignum, flags, &limbs[..significant])
-    }
-
-    /// Creates a Words32 object of `len` elements, all `fill`.
-    pub fn alloc_words(&mut self, len: usize, fill: u32) -> Result<Value, AllocError> {
-        self.raw_filled(Kind::Words32, len, fill)
-    }
-
-    /// Creates a Words64 object of `len` elements, all 0.
-    pub(crate) fn alloc_words64(&mut self, len: usize) -> Result<Value, AllocError> {
-        self.raw_filled(Kind::Words64, len, 0u64)
-    }
-
-    /// Creates a Bytes object of these bytes.
-    pub fn alloc_bytes(&mut self, bytes: &[u8]) -> Result<Value, AllocError> {
-        self.raw_from(Kind::Bytes, 0, bytes)
-    }
-
-    /// Creates a Bytes object of `len` bytes, all `fill`.
-    pub fn alloc_bytes_filled(&mut self, len: usize, fill: u8) -> Result<Value, AllocError> {
-        self.raw_filled(Kind::Bytes, len, fill)
-    }
-
-    /// Creates a Bytes object of bits. Bytes above 1 become 1.
-    pub fn alloc_bits(&mut self, bits: &[u8]) -> Result<Value, AllocError> {
-        let bits: Vec<u8> = bits.iter().map(|&bit| bit.min(1)).collect();
-        self.raw_from(Kind::Bytes, Bytes::BITS, &bits)
-    }
-
-    /// Creates a Bytes object of `len` bits.
-    pub fn alloc_bits_filled(&mut self, len: usize, fill: bool) -> Result<Value, AllocError> {
-        self.raw_filled_with(Kind::Bytes, Bytes::BITS, len, u8::from(fill))
-    }
-
     /// Allocates an object. Its header is written, its `len` elements are not.
     #[inline(always)]
-    fn begin_object(
+    pub(super) fn begin_object(
         &mut self,
         kind: Kind,
         flags: u8,
@@ -506,7 +310,7 @@ impl Heap {
 
     /// Creates a record of the values of `first` and then those of `rest`.
     #[inline(always)]
-    fn record_from(
+    pub(super) fn record_from(
         &mut self,
         kind: Kind,
         flags: u8,
@@ -524,41 +328,6 @@ impl Heap {
             Ok(Value::from_object(object))
         }
     }
-
-    fn raw_from<T: Copy>(&mut self, kind: Kind, flags: u8, elements: &[T]) -> Result<Value, AllocError> {
-        debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
-        let object = self.begin_object(kind, flags, 0, elements.len())?;
-        // SAFETY: `begin_object` gave room for as many elements of this size; they are written before the
-        // value is made.
-        unsafe {
-            std::ptr::copy_nonoverlapping(elements.as_ptr(), object.add(1).cast::<T>(), elements.len());
-            Ok(Value::from_object(object))
-        }
-    }
-
-    fn raw_filled<T: Copy>(&mut self, kind: Kind, len: usize, fill: T) -> Result<Value, AllocError> {
-        self.raw_filled_with(kind, 0, len, fill)
-    }
-
-    fn raw_filled_with<T: Copy>(
-        &mut self,
-        kind: Kind,
-        flags: u8,
-        len: usize,
-        fill: T,
-    ) -> Result<Value, AllocError> {
-        debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
-        let object = self.begin_object(kind, flags, 0, len)?;
-        // SAFETY: `begin_object` gave room for `len` elements of this size; they are written before the value
-        // is made.
-        unsafe {
-            let elements = object.add(1).cast::<T>();
-            for i in 0..len {
-                elements.add(i).write(fill);
-            }
-            Ok(Value::from_object(object))
-        }
-    }
 }
 
 /// Returns whether the heap guarantees the contents of objects of this kind.
@@ -572,16 +341,6 @@ mod tests {
 
     /// Number of elements of a large vector, small enough for Miri.
     const LONG: usize = crate::heap::arena::LARGE;
-
-    #[test]
-    fn strings_are_made_of_parts_of_others() {
-        let mut heap = Heap::for_tests();
-        let word = heap.alloc_str("word").unwrap();
-        let joined = heap.alloc_string_of(6, 2, |heap, part| &heap.string(word).unwrap()[part + 1..]);
-        assert_eq!(heap.string_text(joined.unwrap()).unwrap(), "ordrd\0");
-        let cut = heap.alloc_string_of(3, 2, |heap, _| heap.string(word).unwrap());
-        assert_eq!(heap.string_text(cut.unwrap()).unwrap(), "wor");
-    }
 
     #[test]
     fn long_vectors_are_filled_in_pieces() {

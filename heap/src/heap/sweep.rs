@@ -7,9 +7,7 @@
 //! Guarantees: every block is swept once between two markings. Sweeping does not touch objects allocated
 //! since it began.
 
-use super::alloc::PIECE;
 use super::arena::{ARENA, BLOCKS, BlockState};
-use super::layout::GRANULE;
 use super::{Heap, Phase, SliceOutcome};
 use crate::list_state;
 

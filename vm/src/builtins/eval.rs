@@ -24,7 +24,6 @@
 //! counts against the limit of the memory: beyond it, the next step fails for want of room.
 
 use esl_bytecode::compile::{Compilation, CompileTimeFailure, Step, StepOutcome, Work};
-use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file;
 use esl_bytecode::span::Span;
@@ -33,12 +32,11 @@ use esl_bytecode::verify::verify;
 use crate::builtins::array::{ArrayElements, vector_elements};
 use crate::builtins::expect::optional;
 use crate::builtins::rights::demand;
-use crate::builtins::stream::{Then, file_error, more_input, right_to, skip_source, source};
-use crate::builtins::symbol::{designated_text, text_between, text_of};
+use crate::builtins::stream::{file_error, right_to};
+use crate::builtins::symbol::{designated_text, text_of};
 use crate::compiler::{ActiveCompilation, CompilerJob, FormText, FormWalk, JobId};
 use crate::datum::{DatumError, DatumWalk, Unit};
 use crate::environment;
-use crate::equality::characters_of;
 use crate::heap::Holder;
 use crate::host::Host;
 use crate::raise::{Exit, Outcome, Raised};
@@ -47,16 +45,7 @@ use crate::vm::Vm;
 use crate::world::load::{Alone, ModuleLoad, load};
 
 use super::expect::exactly;
-use super::integer::radix;
-
-/// Number of characters in which the next datum of a text is looked for at first; twice as many whenever it
-/// may go on after them. So reading all data of a text takes time in proportion to its length.
-const FIRST_PART: usize = 256;
-
-/// Returns whether a diagnostic with this code says that a text ends in the middle of a datum.
-fn is_unfinished(code: &str) -> bool {
-    code.starts_with("unclosed-") || code.starts_with("unfinished-")
-}
+use super::reading::{ReadOutcome, read_datum};
 
 /// Units that [`Exchange::charge`](crate::exchange::Exchange::charge) takes for a unit of a compilation's
 /// work, which is worth more than a cell of a list.
@@ -214,92 +203,6 @@ fn list_of_diagnostics(vm: &mut Vm, compilation: &dyn Compilation, diagnostics: 
         list = vm.heap.cons(entry, list)?;
     }
     Ok(list)
-}
-
-/// Reads a datum of `text`, which may have a name, from byte `start` on.
-fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Result<ReadOutcome, Exit> {
-    if let Some(base) = vm.symbol_value(vm.world.known.read_base) {
-        radix(vm, base)?;
-    }
-    vm.world.check_room(&mut vm.heap)?;
-    let read = environment::with_compiler(vm, |vm, compiler| {
-        let read = compiler.read(vm, text, start);
-        read.map_err(|diagnostic| ReadFault { text: compiler.render(&diagnostic, name, text), diagnostic })
-    })?;
-    let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
-    vm.exchange.charge(end.saturating_sub(start));
-    match read {
-        Ok((Some(datum), end)) => Ok(ReadOutcome::Datum(datum, end)),
-        Ok((None, _)) => Ok(ReadOutcome::End),
-        Err(fault) => Ok(ReadOutcome::Fault(fault)),
-    }
-}
-
-/// Reads the first datum of `text`; `None` if what comes after the text may belong to it.
-fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<FirstRead>, Exit> {
-    let count = |end: usize| text[..end].chars().count();
-    let read = |values: [Value; 3], end: usize| FirstRead { values: Ok(values), characters: count(end) };
-    Ok(Some(match read_datum(vm, text, 0, None)? {
-        ReadOutcome::Datum(_, end)
-            if then != Then::End && end == text.len() && !text.ends_with([')', '"']) =>
-        {
-            return Ok(None);
-        }
-        ReadOutcome::Datum(datum, end) => {
-            let (object, calls) = read_object(vm, &datum)?;
-            read([Value::T, object, calls], end)
-        }
-        // What is faulty where the text is cut may be part of something else.
-        ReadOutcome::Fault(fault) if then != Then::Rest && !fault.is_unfinished() => {
-            // What comes after the fault is read the next time.
-            let end = text.ceil_char_boundary((fault.diagnostic.primary.span.end as usize).max(1));
-            FirstRead { values: Err(fault.text), characters: count(end) }
-        }
-        ReadOutcome::End | ReadOutcome::Fault(_) if then != Then::End => return Ok(None),
-        ReadOutcome::End => read([Value::NIL; 3], text.len()),
-        ReadOutcome::Fault(_) => read([vm.world.known.unfinished, Value::NIL, Value::NIL], text.len()),
-    }))
-}
-
-/// What comes first in a text.
-struct FirstRead {
-    /// Whether there is a datum, the object, and the calls in it; or the message about what is no datum.
-    values: Result<[Value; 3], String>,
-    /// Number of characters up to its end.
-    characters: usize,
-}
-
-/// Returns a datum that was read as an object, and the list of the calls in it.
-fn read_object(vm: &mut Vm, datum: &Datum) -> Result<(Value, Value), Exit> {
-    let mut unit = Unit::default();
-    let value = unit.value_of(&mut vm.heap, &mut vm.world, datum);
-    vm.exchange.charge(unit.take_work() as usize);
-    let calls = vm.heap.list(&unit.take_calls())?;
-    Ok((value?, calls))
-}
-
-/// Result of reading.
-enum ReadOutcome {
-    /// A datum, and the offset of the byte after it.
-    Datum(Datum, usize),
-    /// Nothing but white space.
-    End,
-    /// No datum.
-    Fault(ReadFault),
-}
-
-/// Fault in a text that is read.
-struct ReadFault {
-    diagnostic: Box<Diagnostic>,
-    /// The diagnostic, drawn for people.
-    text: String,
-}
-
-impl ReadFault {
-    /// Returns whether the text ends in the middle of a datum.
-    fn is_unfinished(&self) -> bool {
-        is_unfinished(self.diagnostic.code)
-    }
 }
 
 /// The form becomes a datum in the steps of the compilation.
@@ -495,50 +398,4 @@ pub(super) fn end_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.charge(freed * FORM_UNITS);
     recount(vm);
     Ok(Value::boolean(are_left))
-}
-
-/// The first value is `NIL` at the end of the string, and `:unfinished` if the datum goes on behind it.
-pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let string = arguments[0];
-    let Some(length) = characters_of(&vm.heap, string).map(<[u32]>::len) else {
-        return vm.exchange.type_error(string, "STRING");
-    };
-    let (start, end) = vm.exchange.bounds(optional(arguments, 1), optional(arguments, 2), length)?;
-    let mut part = FIRST_PART;
-    loop {
-        let limit = end.min(start.saturating_add(part));
-        let text = text_between(&vm.heap, string, start, limit);
-        let then = if limit < end { Then::Rest } else { Then::End };
-        if let Some(FirstRead { values, characters }) = read_first(vm, &text, then)? {
-            return match values {
-                Ok([status, object, calls]) => {
-                    vm.give_values(&[status, object, Value::index(start + characters), calls])
-                }
-                Err(message) => vm.exchange.raise(Raised::Reader(message)),
-            };
-        }
-        part = part.saturating_mul(2);
-    }
-}
-
-/// What was read is taken from the stream.
-pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let stream = optional(arguments, 0);
-    let mut part = FIRST_PART;
-    loop {
-        let source = source(vm, stream, part)?;
-        if let Some(FirstRead { values, characters }) = read_first(vm, &source.text, source.then)? {
-            skip_source(vm, stream, &source, characters);
-            return match values {
-                Ok(values) => vm.give_values(&values),
-                Err(message) => vm.exchange.raise(Raised::Reader(message)),
-            };
-        }
-        match source.then {
-            Then::Input if source.is_console => more_input(vm)?,
-            // A channel is supplied by the twin.
-            Then::Input => return Err(Exit::Slowly),
-            Then::Rest | Then::End => part = part.saturating_mul(2),
-        }
-    }
 }

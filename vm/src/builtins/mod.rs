@@ -79,6 +79,7 @@ mod operation;
 mod outside;
 mod package;
 mod print;
+mod reading;
 mod rights;
 mod search;
 mod sequence;

@@ -23,6 +23,7 @@
 mod bucket;
 mod facts;
 mod formula;
+mod index;
 mod open;
 mod plan;
 mod query;

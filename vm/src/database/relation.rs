@@ -11,11 +11,10 @@
 //! has bound once such queries have looked at more rows in vain than there are facts. So the work of any
 //! sequence of queries is at most a few times that with the best choice of indexes.
 
-use super::bucket::{Buckets, NONE, finish, mix};
+use super::bucket::{Buckets, NONE};
+use super::index::{ChainLink, EMPTY, Ends, Index, hash_cells, push, unlink};
 use super::term::Term;
 
-/// Predecessor of a row that is in no chain.
-const UNLINKED: u32 = u32::MAX - 1;
 /// Number of rows below which looking at all of them is best.
 const FEW: usize = 8;
 /// Greatest number of indexes of a relation.
@@ -23,45 +22,11 @@ const MOST_INDEXES: usize = 8;
 /// Number of leading arguments that an index can cover.
 pub(super) const INDEXED_POSITIONS: usize = 64;
 
-#[derive(Clone, Copy, Debug)]
-struct ChainLink {
-    before: u32,
-    after: u32,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Ends {
-    first: u32,
-    last: u32,
-}
-
-const EMPTY: Ends = Ends { first: NONE, last: NONE };
-
 /// The changes that made and ended a fact.
 #[derive(Clone, Copy, Debug)]
 struct Lifespan {
     born: u64,
     died: u64,
-}
-
-#[derive(Clone, Debug)]
-struct Group {
-    ends: Ends,
-    count: u32,
-}
-
-/// An index: the rows by their cells at some positions.
-#[derive(Clone, Debug)]
-pub(super) struct Index {
-    mask: u64,
-    keys: Buckets,
-    groups: Vec<Group>,
-    free_groups: Vec<u32>,
-    links: Vec<ChainLink>,
-    /// Number of different keys.
-    distinct: usize,
-    /// The next row to be indexed; [`NONE`] when the index is complete.
-    position: u32,
 }
 
 #[derive(Clone, Debug)]
@@ -102,49 +67,6 @@ pub(super) enum Access {
     Nothing,
     /// Complete this index first.
     Build(usize),
-}
-
-fn push(links: &mut Vec<ChainLink>, ends: &mut Ends, row: u32) {
-    if links.len() <= row as usize {
-        links.resize(row as usize + 1, ChainLink { before: UNLINKED, after: NONE });
-    }
-    links[row as usize] = ChainLink { before: ends.last, after: NONE };
-    match ends.last {
-        NONE => ends.first = row,
-        last => links[last as usize].after = row,
-    }
-    ends.last = row;
-}
-
-/// Takes a row out of its chain. The row keeps its successor, for queries with their cursor on it.
-fn unlink(links: &mut [ChainLink], ends: &mut Ends, row: u32) {
-    let ChainLink { before, after } = links[row as usize];
-    match before {
-        NONE => ends.first = after,
-        before => links[before as usize].after = after,
-    }
-    match after {
-        NONE => ends.last = before,
-        after => links[after as usize].before = before,
-    }
-    links[row as usize].before = UNLINKED;
-}
-
-fn positions(mask: u64) -> impl Iterator<Item = usize> {
-    let mut rest = mask;
-    std::iter::from_fn(move || {
-        let position = rest.trailing_zeros() as usize;
-        rest &= rest.wrapping_sub(1);
-        (position < 64).then_some(position)
-    })
-}
-
-fn hash_cells(cells: &[Term]) -> u32 {
-    finish(cells.iter().fold(1, |hash, cell| mix(hash, cell.bits())))
-}
-
-fn hash_key(mask: u64, cells: &[Term]) -> u32 {
-    finish(positions(mask).fold(1, |hash, position| mix(hash, cells[position].bits())))
 }
 
 impl Relation {
@@ -433,71 +355,5 @@ impl Relation {
         // factor.
         let guess = live.powf(1.0 / (1.0 + f64::from(bound.count_ones())));
         by_index.reduce(f64::min).unwrap_or(guess)
-    }
-}
-
-impl Index {
-    fn new(mask: u64, position: u32) -> Index {
-        Index {
-            mask,
-            keys: Buckets::default(),
-            groups: Vec::new(),
-            free_groups: Vec::new(),
-            links: Vec::new(),
-            distinct: 0,
-            position,
-        }
-    }
-
-    fn find(&self, key: &[Term], cells: &[Term], width: usize) -> Option<u32> {
-        let is_it = |group: u32| {
-            let start = self.groups[group as usize].ends.first as usize * width;
-            positions(self.mask).all(|position| cells[start + position] == key[position])
-        };
-        self.keys.find(hash_key(self.mask, key), is_it)
-    }
-
-    fn take_in(&mut self, row: u32, cells: &[Term], width: usize) {
-        let start = row as usize * width;
-        let key = &cells[start..start + width];
-        let group = match self.find(key, cells, width) {
-            Some(group) => group,
-            None => {
-                let fresh = Group { ends: EMPTY, count: 0 };
-                let group = match self.free_groups.pop() {
-                    Some(group) => {
-                        self.groups[group as usize] = fresh;
-                        group
-                    }
-                    None => {
-                        self.groups.push(fresh);
-                        (self.groups.len() - 1) as u32
-                    }
-                };
-                self.keys.add(group, hash_key(self.mask, key));
-                self.distinct += 1;
-                group
-            }
-        };
-        let entry = &mut self.groups[group as usize];
-        push(&mut self.links, &mut entry.ends, row);
-        entry.count += 1;
-    }
-
-    fn leave(&mut self, row: u32, cells: &[Term], width: usize) {
-        if self.links.get(row as usize).is_none_or(|link| link.before == UNLINKED) {
-            return;
-        }
-        let start = row as usize * width;
-        let Some(group) = self.find(&cells[start..start + width], cells, width) else { return };
-        let entry = &mut self.groups[group as usize];
-        entry.count -= 1;
-        if entry.count == 0 {
-            // The key of a group is that of its first row, so it is removed while that row is still there.
-            self.keys.remove(group);
-            self.free_groups.push(group);
-            self.distinct -= 1;
-        }
-        unlink(&mut self.links, &mut self.groups[group as usize].ends, row);
     }
 }

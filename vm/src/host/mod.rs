@@ -25,6 +25,8 @@ mod look;
 mod operation;
 mod question;
 mod real;
+#[cfg(unix)]
+mod real_output;
 mod record;
 mod replay;
 mod rights;

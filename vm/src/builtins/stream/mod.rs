@@ -8,7 +8,7 @@
 use crate::builtins::COPY_LIMIT;
 use crate::builtins::array::{ArrayElements, vector_elements};
 use crate::builtins::expect::optional;
-use crate::builtins::symbol::{text_between, text_of};
+use crate::builtins::symbol::text_between;
 use crate::equality::characters_of;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Kind};
