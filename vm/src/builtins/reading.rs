@@ -68,7 +68,7 @@ fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<FirstRead>, 
         ReadOutcome::Fault(fault) if then != Then::Rest && !fault.is_unfinished() => {
             // What comes after the fault is read the next time.
             let end = text.ceil_char_boundary((fault.diagnostic.primary.span.end as usize).max(1));
-            FirstRead { values: Err(fault.text), characters: count(end) }
+            FirstRead { values: Err(fault), characters: count(end) }
         }
         ReadOutcome::End | ReadOutcome::Fault(_) if then != Then::End => return Ok(None),
         ReadOutcome::End => read([Value::NIL; 3], text.len()),
@@ -78,8 +78,8 @@ fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<FirstRead>, 
 
 /// What comes first in a text.
 struct FirstRead {
-    /// Whether there is a datum, the object, and the calls in it; or the message about what is no datum.
-    values: Result<[Value; 3], String>,
+    /// Whether there is a datum, the object, and the calls in it; or what is no datum.
+    values: Result<[Value; 3], ReadFault>,
     /// Number of characters up to its end.
     characters: usize,
 }
@@ -134,7 +134,7 @@ pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
                 Ok([status, object, calls]) => {
                     vm.give_values(&[status, object, Value::index(start + characters), calls])
                 }
-                Err(message) => vm.exchange.raise(Raised::Reader(message)),
+                Err(fault) => vm.exchange.raise(Raised::Reader(fault.text)),
             };
         }
         part = part.saturating_mul(2);
@@ -151,7 +151,7 @@ pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             skip_source(vm, stream, &source, characters);
             return match values {
                 Ok(values) => vm.give_values(&values),
-                Err(message) => vm.exchange.raise(Raised::Reader(message)),
+                Err(fault) => vm.exchange.raise(Raised::Reader(fault.text)),
             };
         }
         match source.then {
