@@ -181,8 +181,8 @@ impl MachineCode {
 impl Drop for MachineCode {
     fn drop(&mut self) {
         if let Some(module) = self.module.take() {
-            // SAFETY: the contract of the crate: it does not run, and whoever kept it does not enter it
-            // again.
+            // SAFETY: whoever drops machine code has seen to it that no task is in it, and that no entry
+            // leads to it any more.
             unsafe { module.free_memory() };
         }
     }

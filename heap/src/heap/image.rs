@@ -351,11 +351,11 @@ mod tests {
         assert!(Heap::for_tests().save(None).is_none());
         let (mut one, mut other) = (heap(), heap());
         let image = one.save(None).expect("the collector rests");
-        // SAFETY: no value is used.
+        // SAFETY: the values of the contents until now are not used again.
         assert!(!unsafe { other.restore(&image) });
         one.begin_cycle();
         assert!(one.save(None).is_none());
-        // SAFETY: no value is used.
+        // SAFETY: the values of the contents until now are not used again.
         assert!(unsafe { one.restore(&image) });
         assert!(one.save(None).is_some());
     }

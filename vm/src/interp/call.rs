@@ -94,7 +94,8 @@ pub(super) unsafe fn call(
         (code, Shape::unpack((*code).spare[0]))
     };
     if shape.sort == Sort::Native {
-        // SAFETY: the contract of `call_native` is that of this function.
+        // SAFETY: by the contract the arguments stay where they are until the call is made; a frame of this
+        // place has room for them.
         return unsafe { call_native(vm, shape.number, arguments, place) };
     }
     let mut arranged = Arguments::new();
@@ -157,7 +158,7 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: *const [Value], place
         let text = format!("{text}; it takes {}", describe_arity(info.arity.min as usize, info.arity.max));
         return failure(vm, Raised::Program(text));
     }
-    // SAFETY: the contract: no builtin writes to the stack or moves it.
+    // SAFETY: by the contract the arguments are live; no builtin writes to the stack or moves it.
     match vm.natives[usize::from(number)](vm, unsafe { &*arguments }) {
         Ok(value) => {
             vm.exchange.values.clear();

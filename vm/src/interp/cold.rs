@@ -265,7 +265,7 @@ fn expect_slot(vm: &mut Vm, instance: Value, slot: usize, class: Value) -> Resul
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, index: usize) -> bool {
-    // SAFETY: the contract is that of `class_constant`.
+    // SAFETY: by the contract the frame at `base` runs, and the constant is for a class.
     let class = unsafe { class_constant(vm, base, index) };
     vm.world.is_instance(&vm.heap, value, class)
 }

@@ -64,7 +64,7 @@ pub(crate) fn top_of_task(task: &Task) -> usize {
 /// `task.base` is the offset of its running frame.
 unsafe fn scan(heap: &mut Heap, task: &mut Task) {
     task.stack.scan = 0;
-    // SAFETY: the contract is the same.
+    // SAFETY: F3: by the contract the base is that of the frame, up to which the stack holds values.
     _ = unsafe { scan_pieces(heap, task, usize::MAX) };
 }
 

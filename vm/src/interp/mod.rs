@@ -260,7 +260,7 @@ unsafe fn element(object: Value, i: usize) -> *mut Value {
 
 #[inline(always)]
 fn is_simple_vector(v: Value) -> bool {
-    // SAFETY: an object's value is the address of a live header.
+    // SAFETY: H1, H2: an object's value is the address of a live header.
     v.is_object() && unsafe { (*v.object_ptr()).kind == Kind::SimpleVector }
 }
 

@@ -51,7 +51,7 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
             *start.add(2) = function;
             *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
         }
-        // SAFETY: this is a Code.
+        // SAFETY: `direct_code` has found the Code of this Function.
         let first = unsafe { first_instruction(code_of(function)) };
         task.pc = SavedPc::new(first);
         task.base = FIRST_BASE;

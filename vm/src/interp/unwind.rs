@@ -1,7 +1,7 @@
 //! Instructions on the control stack, and unwinding.
 //!
 //! Every instruction here has the contract of [`super::settle`]: `pc` is at an instruction of the row it
-//! serves, `base` is the running frame's, and what the verifier proved holds (V1 to V13).
+//! serves, `base` is the running frame's, and what the verifier proved holds (V1 to V14).
 
 use esl_bytecode::opcode::Opcode;
 use esl_bytecode::word::Word;
@@ -254,7 +254,8 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
         let height = task.control.entries.len();
         match unwinding.target {
             UnwindTarget::Entry(index) | UnwindTarget::Limit(index) if index + 1 >= height => {
-                // SAFETY: the contract of `unwind` is that of `land`, and the target is the topmost entry.
+                // SAFETY: F1: by the contract `vm.cpu` describes the running task, and the target is its
+                // topmost entry; F5: the frame of the entry is live.
                 return unsafe { land(vm, unwinding.values) };
             }
             UnwindTarget::Return { entries, base } if height <= entries => {

@@ -1,7 +1,7 @@
 //! Special variables and global functions: the slow parts of their instructions.
 //!
 //! Every instruction here has the contract of [`super::settle`]: `pc` is at an instruction of the row it
-//! serves, `base` is the running frame's, and what the verifier proved holds (V1 to V13).
+//! serves, `base` is the running frame's, and what the verifier proved holds (V1 to V14).
 
 use super::{Signal, code_of, constant, failure, word_at};
 use crate::heap::layout::{Kind, SymbolObject};
