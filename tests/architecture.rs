@@ -1,6 +1,7 @@
 //! `ARCHITECTURE.md` maps the code completely and correctly: its tables list exactly the modules that exist,
 //! and each type in its glossary exists. So does each file that it and the other documents at the root name.
-//! The name of a type means one thing in the whole workspace.
+//! The name of a type means one thing in the whole workspace. Errors have types, files are as long as one
+//! thing takes, and comments are as narrow as code.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -58,43 +59,47 @@ fn the_map_lists_every_module() {
 /// Returns the names of all types that the Rust files below `folder` declare.
 fn declared_types(folder: PathBuf) -> BTreeSet<String> {
     let mut types = BTreeSet::new();
-    let mut folders = vec![folder];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).expect("the sources can be listed") {
-            let path = entry.expect("the sources can be listed").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let text = fs::read_to_string(path).expect("a source can be read");
-                for keyword in ["struct ", "enum ", "trait ", "type "] {
-                    let names = text.split(keyword).skip(1).map(|rest| {
-                        rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or_default()
-                    });
-                    types.extend(names.map(String::from));
-                }
-                // A macro declares the types of operands, each in a row with its role.
-                let rows = text.lines().filter(|line| line.contains(", Role::"));
-                types.extend(rows.filter_map(|line| Some(line.trim().split_once('(')?.0.to_string())));
-            }
+    for path in sources(folder) {
+        let text = fs::read_to_string(path).expect("a source can be read");
+        for keyword in ["struct ", "enum ", "trait ", "type "] {
+            let names = text.split(keyword).skip(1).map(|rest| {
+                rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or_default()
+            });
+            types.extend(names.map(String::from));
         }
+        // A macro declares the types of operands, each in a row with its role.
+        let rows = text.lines().filter(|line| line.contains(", Role::"));
+        types.extend(rows.filter_map(|line| Some(line.trim().split_once('(')?.0.to_string())));
     }
     types
 }
 
 /// Returns the files of Rust below a folder.
 fn sources(folder: PathBuf) -> Vec<PathBuf> {
+    let mut files = files_below(folder);
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "rs"));
+    files
+}
+
+/// Returns the files below a folder, without those of builds and of git.
+fn files_below(folder: PathBuf) -> Vec<PathBuf> {
     let (mut folders, mut files) = (vec![folder], Vec::new());
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).expect("the sources can be listed") {
             let path = entry.expect("the sources can be listed").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
+            if !path.is_dir() {
                 files.push(path);
+            } else if !path.ends_with("target") && !path.ends_with(".git") {
+                folders.push(path);
             }
         }
     }
     files
+}
+
+/// Returns the path of a file below the root, as documents write it.
+fn path_in_tree(path: &Path) -> String {
+    path.strip_prefix(root()).unwrap_or(path).to_string_lossy().replace('\\', "/")
 }
 
 /// Returns the files of Rust below a folder that are no tests.
@@ -141,6 +146,123 @@ fn comments_are_as_narrow_as_code() {
         }
     }
     assert!(wide.is_empty(), "comments wider than {COLUMNS} columns: {wide:#?}");
+}
+
+/// Returns whether a line of a program in ESL or a script is a comment in words, not one that states an
+/// output.
+fn is_wide_comment(line: &str, mark: char) -> bool {
+    let words = line.trim_start();
+    words.starts_with(mark) && !words.contains("expect") && line.chars().count() > COLUMNS
+}
+
+#[test]
+fn comments_of_programs_and_scripts_are_as_narrow() {
+    let mut wide = Vec::new();
+    for path in files_below(root().to_path_buf()) {
+        let mark = match path.extension().and_then(|extension| extension.to_str()) {
+            Some("esl") => ';',
+            Some("sh") => '#',
+            None if fs::read(&path).is_ok_and(|bytes| bytes.starts_with(b"#!")) => '#',
+            _ => continue,
+        };
+        let text = fs::read_to_string(&path).expect("a program can be read");
+        let lines = text.lines().zip(1..).filter(|(line, _)| is_wide_comment(line, mark));
+        wide.extend(lines.map(|(_, number)| format!("{}:{number}", path_in_tree(&path))));
+    }
+    assert!(wide.is_empty(), "comments wider than {COLUMNS} columns: {wide:#?}");
+}
+
+/// Lines that a file may have.
+const LINES: usize = 500;
+
+/// Files that have more, and why one file is right for them.
+const LONG_FILES: &[(&str, &str)] = &[
+    ("bytecode/src/builtin.rs", "a table: a row for each builtin"),
+    ("bytecode/src/opcode.rs", "a table: a row for each opcode, and what is derived of the columns"),
+    ("bytecode/tests/soundness.rs", "a model of the machine: an arm for each opcode, over one state"),
+    ("compiler/src/expand/expander.rs", "one state, and the jobs, stops and findings that change it"),
+    ("compiler/src/lower/tests/model.rs", "a model of the core language: an arm for each kind of node"),
+    ("compiler/src/lower/tests/notation.rs", "a reader of the core language: an arm for each kind of node"),
+    ("vm/src/explore/fingerprint.rs", "one walk over all objects, a part for each kind"),
+    ("vm/src/interp/mod.rs", "the loop: an arm for each opcode"),
+    ("vm/src/interp/tests/arms.rs", "a table: a program for each opcode"),
+];
+
+#[test]
+fn a_file_is_as_long_as_one_thing_takes() {
+    let mut long = BTreeSet::new();
+    for path in sources(root().to_path_buf()) {
+        let text = fs::read_to_string(&path).expect("a source can be read");
+        if text.lines().count() > LINES {
+            long.insert(path_in_tree(&path));
+        }
+    }
+    let listed: BTreeSet<String> = LONG_FILES.iter().map(|(path, _)| (*path).into()).collect();
+    let unlisted: Vec<&String> = long.difference(&listed).collect();
+    assert!(unlisted.is_empty(), "more than {LINES} lines without a reason: {unlisted:#?}");
+    let short: Vec<&String> = listed.difference(&long).collect();
+    assert!(short.is_empty(), "a reason for what has {LINES} lines or fewer: {short:#?}");
+}
+
+#[test]
+fn modules_with_children_are_folders() {
+    // A test of a package is a file beside the folder of its modules.
+    let is_test = |path: &Path| path.parent().is_some_and(|folder| folder.ends_with("tests"));
+    let mut two = sources(root().to_path_buf());
+    two.retain(|path| path.with_extension("").is_dir() && !is_test(path));
+    assert!(two.is_empty(), "these belong into their folders, as `mod.rs`: {two:#?}");
+}
+
+/// Results whose error is a text, and why there is nothing to say but the text.
+const ERRORS_AS_TEXTS: &[(&str, &str)] = &[];
+
+/// Returns the second argument of each `Result<…>` in a text that has two.
+fn error_types(text: &str) -> Vec<&str> {
+    let mut found = Vec::new();
+    for (at, _) in text.match_indices("Result<") {
+        let inside = &text[at + "Result<".len()..];
+        let (mut depth, mut start, mut before) = (0, 0, ' ');
+        for (at, c) in inside.char_indices() {
+            match c {
+                '<' | '(' | '[' => depth += 1,
+                // The head of an arrow closes nothing.
+                '>' if before == '-' => {}
+                '>' if depth == 0 && start == 0 => break,
+                '>' if depth == 0 => {
+                    found.push(inside[start..at].trim().trim_end_matches(','));
+                    break;
+                }
+                '>' | ')' | ']' => depth -= 1,
+                ',' if depth == 0 && !inside[at + 1..].trim_start().starts_with('>') => start = at + 1,
+                _ => {}
+            }
+            before = c;
+        }
+    }
+    found
+}
+
+#[test]
+fn errors_have_types() {
+    let folders =
+        SECTIONS.iter().map(|(_, folder)| *folder).chain(["stdlib", "playground", "benches", "fuzz"]);
+    let mut found = BTreeSet::new();
+    for path in folders.flat_map(|folder| product_sources(root().join(folder))) {
+        let text = fs::read_to_string(&path).expect("a source can be read");
+        let product = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+        let types = error_types(product);
+        if types.contains(&"String") || product.contains("type Err = String;") {
+            found.insert(path_in_tree(&path));
+        }
+    }
+    let listed: BTreeSet<String> = ERRORS_AS_TEXTS.iter().map(|(path, _)| (*path).into()).collect();
+    assert_eq!(found, listed, "files with `Result<_, String>` and those that have a reason for it");
+    assert_eq!(
+        error_types(
+            "fn a(f: fn(&str) -> Result<Vec<(A, B)>,\n    String,\n>) -> Result<(), E> { io::Result<String> }"
+        ),
+        ["String", "E"]
+    );
 }
 
 #[test]
