@@ -1,5 +1,5 @@
-//! The tutorial, `docs/tutorial/*.md`, done as a reader does it,
-//! from the first line to the last in one new folder.
+//! The tutorial, `docs/tutorial/*.md`, done as a reader does it, from the first line to the last in one new
+//! folder.
 //!
 //! A `lisp` block whose first line is a comment with the name of a file becomes that file. In a `console`
 //! block, lines that begin with `$ ` are run by a shell, those that begin with `? ` are typed at the prompt

@@ -1,5 +1,5 @@
-//! The ticks of a run may come in any portions, and between two of them the machine may return to a state of
-//! before: the schedule is the same, to the tick.
+//! The ticks of a run may come in any portions, and between two of them the machine may return to an
+//! earlier state: the schedule is the same, to the tick.
 
 use esl::Config;
 use esl::host::{Captured, VirtualHost};

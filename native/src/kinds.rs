@@ -1,18 +1,16 @@
-//! What is known of registers before each instruction: which hold fixnums, and which hold doubles without a
-//! box.
+//! The kinds of registers before each instruction: which hold fixnums, and which hold doubles without a box.
 //!
-//! It is found by following all ways until nothing changes, from the assumption that a way not followed yet
-//! says nothing against it. So a variable of a loop that begins as a double and stays one is known to be one
-//! all the time. The translation keeps what is said here: a result that is of another kind leads out of the
-//! machine code, at the instruction or behind it. Where machine code is entered at a loop instruction, it
-//! tests what is said of the registers that are used from there on.
+//! A data flow over all paths finds them. It begins with the assumption that a path not followed yet agrees
+//! with everything, so a variable of a loop that begins as a double and stays one is known as a double
+//! throughout. The translation relies on the result: where an operation gives another kind, the machine code
+//! is left, at the instruction or behind it. An entry at a loop instruction tests the kinds of the registers
+//! that are used from there on.
 //!
-//! Nothing tells what comes from an object or a call, or what a parameter is. If the register held a double
-//! when the machine code was asked for, the guess is that it is one again; this is tested at the instruction.
+//! The kind of a parameter, of a call's result and of a part of an object is unknown. If the register held a
+//! double when the machine code was asked for, the guess is that it will again; the instruction tests it.
 //!
-//! A double that was computed is kept in a register of the processor, and its place in the stack is not
-//! written: it is *kept back* until somebody may look there (N3). Here is also said which registers are kept
-//! back where ways meet: all that may be.
+//! A computed double stays in a register of the processor, and its place in the stack is not written: it is
+//! *kept back* until somebody may look there (N3). Where paths meet, all registers that can be are kept back.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::{Instr, RegisterAccess};

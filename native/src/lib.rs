@@ -3,7 +3,7 @@
 //! The contract between this crate and the interpreter (`esl_vm`, module `interp::native`):
 //!
 //! * **N1, source.** What is translated is the code of one function that has passed the verifier
-//!   (`esl_bytecode::verify`, V1 to V13), at the address at which it stays. Its constants are read when the
+//!   (`esl_bytecode::verify`, V1 to V14), at the address at which it stays. Its constants are read when the
 //!   machine code runs, since some of them change; one that is a number stays the same.
 //! * **N2, frames.** Machine code is entered with the base of a frame of that function (F2 of the
 //!   interpreter), at its first instruction or at one of its loop instructions. It reads and writes registers

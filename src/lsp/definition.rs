@@ -1,5 +1,4 @@
-//! What a text defines at any depth: functions, macros,
-//! variables, causes and all else that begins with `def`.
+//! What a text defines at any depth: functions, macros, variables, causes and all that begins with `def`.
 
 use std::ops::Range;
 

@@ -1,5 +1,5 @@
-//! A browser: Chromium, driven by its own protocol over pipes. The
-//! page of the monitor in it. Left out without it.
+//! A browser: Chromium, driven by its own protocol over pipes. It shows the page of the monitor. Without
+//! Chromium, the tests are left out.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};

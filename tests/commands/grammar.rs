@@ -1,5 +1,5 @@
-//! The grammar for tree-sitter, in `editors/tree-sitter/`: its
-//! corpus, every program of the project, its queries.
+//! The grammar for tree-sitter, in `editors/tree-sitter/`: its corpus, every program of the project, its
+//! queries.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! The playground: what it says of programs, and its page in a browser. The page is left out without Chromium
-//! or without the module for it, which `cargo build -p
-//! esl-playground --target wasm32-unknown-unknown` builds.
+//! or without the module for it, which this command builds:
+//! `cargo build -p esl-playground --target wasm32-unknown-unknown`.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;

@@ -1,4 +1,4 @@
-//! The ESL virtual machine: values, heap, interpreter, tasks.
+//! The ESL virtual machine: the interpreter, tasks and their scheduler, builtins, and the database.
 
 #![deny(unsafe_code)]
 

@@ -3,7 +3,7 @@
 //! The loader, the world and the machine make heaps, code and stubs with these functions. Each names the fact
 //! that makes its unsafe step sound; the rest of the machine needs no unsafe code for any of it.
 //!
-//! Not here: the verifier (`esl_bytecode::verify`), whose theorem V1 to V13 is what [`Verified`] stands for.
+//! Not here: the verifier (`esl_bytecode::verify`), whose theorem V1 to V14 is what [`Verified`] stands for.
 
 #![allow(unsafe_code)]
 
@@ -109,7 +109,7 @@ pub(crate) fn alloc_code(
     _verified: &Verified,
 ) -> Result<Value, AllocError> {
     // SAFETY: the loader takes all parts from one function of the module that `_verified` stands for. That it
-    // has fused instructions changes nothing that V1 to V13 say of them: see `fused`.
+    // has fused instructions changes nothing that V1 to V14 say of them: see `fused`.
     unsafe { heap.alloc_code(parts) }
 }
 

@@ -1,8 +1,8 @@
 //! What ESL programs can do without Rust: modules over the operating system.
 //!
-//! Whatever the system may delay is an operation, done on one event loop in a thread of its own:
-//! it makes only the task wait that has asked for it. The operations are the small part of a
-//! module that is in Rust; the rest of it is in ESL, in `modules/`.
+//! Whatever the system may delay is an operation, done on one event loop in its own thread: only the task that
+//! has asked for it waits. The operations are the small part of a module that is in Rust; the rest is in
+//! ESL, in `modules/`.
 //!
 //! Guarantees: each operation names the right that it needs, which is asked for before it begins. What a
 //! peer, a child or the system does wrong is a failure at the call.

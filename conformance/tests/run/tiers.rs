@@ -1,5 +1,5 @@
-//! Programs run in both tiers: nothing of a run tells whether
-//! functions are interpreted or run as machine code.
+//! Programs run in both tiers: nothing of a run tells whether functions are interpreted or run as machine
+//! code.
 //!
 //! A part of the conformance programs, and random functions of numbers in loops: with long slices, short
 //! ones, and slices of one tick. With the variable `ESL_TIERS=all` of the environment all programs run, also

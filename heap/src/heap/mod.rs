@@ -35,9 +35,9 @@
 //! When [`Heap::gc_due`], the VM takes one of these steps at the next tick:
 //!
 //! ```text
-//! Idle       begin_cycle, mark the fixed roots Marking    slice; when Drained: scan a stack not yet scanned
-//! in this cycle (cycle_id tells) with the visits
-//!            left over, or end_marking when there is none
+//! Idle       begin_cycle, mark the fixed roots
+//! Marking    slice; when Drained: scan a stack not yet scanned in this cycle (cycle_id tells) with the
+//!            visits left over, or end_marking when there is none
 //! Sweeping   slice
 //! ```
 //!

@@ -5,7 +5,7 @@
 //!
 //! Not here: the entries. Searches are given a function that compares them.
 //!
-//! Source: Larson, "Dynamic hash tables", 1988, as in `crate::table`.
+//! Source: Larson, "Dynamic hash tables", 1988, as in `esl_heap::table`.
 
 /// No entry.
 pub(super) const NONE: u32 = u32::MAX;

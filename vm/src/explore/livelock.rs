@@ -1,14 +1,14 @@
-//! Livelocks: ways round from a state back to it that are fair to all, so that nothing but chance ends them.
+//! Livelocks: fair cycles of the graph of states, which a run may follow for ever.
 //!
-//! A way round is fair if each task goes on that could go on all along, if time passes where a timer runs all
-//! along, and if each way is taken that a program may choose by `choose`. It is looked for in the strongly
-//! connected parts of the graph of states, without states at which a chosen way leaves the part: there is one
-//! in a part just if the way through all of the part is one.
+//! A cycle is fair if each task that could go on at each of its states goes on at one of them, if time passes
+//! where a timer runs at each of them, and if each alternative of a `choose` is taken. The search goes through
+//! the strongly connected components of the graph, without the states at which an alternative leaves the
+//! component: a component has a fair cycle exactly if the cycle through all of it is fair.
 //!
-//! Tasks are known by their ranks among those that are there. A step after which others are there belongs to
-//! no such way; nor does one among more than 63 tasks.
+//! A task is identified by its rank among the tasks that exist. A step that changes which tasks exist belongs
+//! to no cycle, and neither does a step among more than 63 tasks.
 //!
-//! Source: parts of a graph by Tarjan 1972; fair parts as by Lichtenstein and Pnueli 1985.
+//! Source: components by Tarjan 1972; fair components as by Lichtenstein and Pnueli 1985.
 
 use std::collections::VecDeque;
 

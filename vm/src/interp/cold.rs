@@ -2,7 +2,7 @@
 //! so that the loop passes three registers and expects nothing back but a [`Signal`].
 //!
 //! Every function here has the contract of [`super::settle`]: `pc` is at an instruction of the row it serves,
-//! `base` is the running frame's, and what the verifier proved holds (V1 to V13).
+//! `base` is the running frame's, and what the verifier proved holds (V1 to V14).
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::module::CaptureSource;

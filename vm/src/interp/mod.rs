@@ -10,7 +10,7 @@
 //! up before it has had any effect. Preemption, collection and aborts happen there and nowhere else, save
 //! that an instruction for which there is no room is given up too, and done again after a collection.
 //!
-//! What the interpreter takes for granted of code is the list V1 to V13 in `esl_bytecode::verify`; its
+//! What the interpreter takes for granted of code is the list V1 to V14 in `esl_bytecode::verify`; its
 //! `SAFETY:` notes name the items. What it owes in return is M1 to M6 there. The notes also name facts that
 //! it establishes itself:
 //!

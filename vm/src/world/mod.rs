@@ -10,7 +10,7 @@
 //! in two *companion* objects, which [`World::object_of`] returns.
 //!
 //! Not here: whether a name may be redefined, which the builtins check; values of task-local bindings
-//! (`control`).
+//! (`task::binding`).
 
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, HashMap};
