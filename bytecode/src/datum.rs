@@ -146,6 +146,14 @@ impl Datum {
         Datum(Arc::new(DatumNode { kind, span, contents }))
     }
 
+    /// As [`Datum::new`], of a kind that may be the symbol `COMMON-LISP:NIL`.
+    pub fn of_kind(kind: DatumKind, span: Span) -> Datum {
+        match kind {
+            DatumKind::Symbol(symbol) => Datum::symbol(symbol, span),
+            kind => Datum::new(kind, span),
+        }
+    }
+
     /// Returns the empty list.
     pub fn nil(span: Span) -> Datum {
         Datum::new(DatumKind::Nil, span)
@@ -192,6 +200,14 @@ impl Datum {
     /// Returns the contents.
     pub fn kind(&self) -> &DatumKind {
         &self.0.kind
+    }
+
+    /// Returns whether it consists of other data.
+    pub fn is_compound(&self) -> bool {
+        matches!(
+            self.kind(),
+            DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) | DatumKind::Call(_)
+        )
     }
 
     /// Where it was written.

@@ -113,9 +113,9 @@ where
     F: FnMut(CallArguments) -> R + Send + 'static,
     R: Future<Output = Completion> + Send + 'static,
 {
-    add(machine, name, needs, move |operation| {
+    add(machine, name, needs, move |mut operation| {
         let cancelled = Some(listen(&operation));
-        let future = Box::pin(function(arguments_of(&operation)));
+        let future = Box::pin(function(CallArguments(operation.take_arguments())));
         event_loop::spawn(UnderWay { begun: BegunOperation::new(future, operation), cancelled })
     });
 }
@@ -127,8 +127,8 @@ pub(crate) fn define_ready<F>(machine: &mut Vm, name: &str, needs: &[Need], mut 
 where
     F: FnMut(CallArguments) -> OperationFuture + Send + 'static,
 {
-    add(machine, name, needs, move |operation| {
-        let future = function(arguments_of(&operation));
+    add(machine, name, needs, move |mut operation| {
+        let future = function(CallArguments(operation.take_arguments()));
         event_loop::begin(BegunOperation::new(future, operation))
     });
 }
@@ -139,15 +139,11 @@ where
     F: FnMut(CallArguments, Cancelled) -> R + Send + 'static,
     R: Future<Output = Completion> + Send + 'static,
 {
-    add(machine, name, needs, move |operation| {
+    add(machine, name, needs, move |mut operation| {
         let cancelled = Cancelled(listen(&operation));
-        let future = Box::pin(function(arguments_of(&operation), cancelled));
+        let future = Box::pin(function(CallArguments(operation.take_arguments()), cancelled));
         event_loop::spawn(BegunOperation::new(future, operation))
     });
-}
-
-fn arguments_of(operation: &HostOperation) -> CallArguments {
-    CallArguments(operation.arguments().to_vec())
 }
 
 /// Returns what is told when the operation is cancelled.

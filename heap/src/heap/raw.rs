@@ -161,8 +161,13 @@ impl Heap {
 
     /// Returns the text of a string; U+FFFD stands for a code point that is not a Unicode scalar value.
     pub fn string_text(&self, v: Value) -> Option<String> {
+        let characters = self.string(v)?;
+        // Most texts are ASCII, and copied faster than characters are encoded one by one.
+        if characters.iter().fold(0, |all, code| all | code) < 0x80 {
+            return String::from_utf8(characters.iter().map(|&code| code as u8).collect()).ok();
+        }
         let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
-        Some(self.string(v)?.iter().map(text).collect())
+        Some(characters.iter().map(text).collect())
     }
 
     /// Returns the elements of a Words32 object.

@@ -3,6 +3,7 @@
 use crate::builtins::rights::demand;
 use crate::builtins::task::expect_task;
 use crate::datum;
+use crate::outside::GivenIndex;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::run;
 use crate::schedule::Measure;
@@ -14,13 +15,13 @@ use esl_bytecode::span::Span;
 
 use super::expect::exactly;
 
-/// Returns the name of a function of the host, and its arguments, from a symbol and a list.
+/// Returns a function of the host, if there is one, and its arguments, from a symbol and a list.
 ///
 /// # Errors
 /// A failure if an argument is no data, or if the program does not have a right that the function needs.
-pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(String, Vec<Datum>), Exit> {
+pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(Option<GivenIndex>, Vec<Datum>), Exit> {
     let (name, arguments) = (call[0], call[1]);
-    let name = vm.heap.symbol(name).and_then(|symbol| vm.heap.string_text(symbol.name));
+    let function = function_named(vm, name);
     let mut data = Vec::new();
     let mut rest = arguments;
     while let Some(pair) = vm.heap.as_cons(rest) {
@@ -33,9 +34,8 @@ pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(String, Vec<Datu
         }
         rest = pair.cdr;
     }
-    let name = name.unwrap_or_default();
     let mut permitted = Vec::new();
-    for need in vm.outside.needs(&name) {
+    for need in function.map_or(Vec::new(), |function| vm.outside.needs(function)) {
         // One argument may need several rights, and each refusal names it as the program does.
         if let Some(DatumKind::String(object)) = data.get(need.argument).map(Datum::kind) {
             permitted.push((need.argument, demand(vm, need.right, object.as_ref())?));
@@ -44,7 +44,13 @@ pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(String, Vec<Datu
     for (argument, object) in permitted {
         data[argument] = Datum::string(&object, Span::default());
     }
-    Ok((name, data))
+    Ok((function, data))
+}
+
+/// Returns the function of the host that a symbol names.
+fn function_named(vm: &Vm, symbol: Value) -> Option<GivenIndex> {
+    let name = vm.heap.string_text(vm.heap.symbol(symbol)?.name)?;
+    vm.outside.function(&name)
 }
 
 /// Returns the handle of an operation that `v` is.
@@ -58,16 +64,16 @@ fn expect_handle(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
 pub(super) fn begin_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let [_, _, detached] = exactly(arguments);
-    let (name, data) = host_call(vm, arguments)?;
-    if !vm.outside.has_operation(&name) {
+    let (function, data) = host_call(vm, arguments)?;
+    let Some(function) = function.filter(|&function| vm.outside.is_operation(function)) else {
         return vm.exchange.raise(Raised::Cause("NOT-IN-THIS-WORLD", arguments[0]));
-    }
+    };
     run::admit(vm, Measure::Operations)?;
     let number = vm.outside.operations.next_number();
     let handle = operation::make(&mut vm.heap, arguments[0], number, vm.world.known.pending)?;
     vm.scheduler.accounts.take(vm.scheduler.running_account(), Measure::Operations);
     let task = vm.scheduler.running_number();
-    vm.outside.begin_operation(&name, &data, handle, detached.is_true(), task);
+    vm.outside.begin_operation(function, &data, handle, detached.is_true(), task);
     Ok(handle)
 }
 
@@ -79,8 +85,8 @@ pub(super) fn tell_of_suspension(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn may_await(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let name = vm.heap.symbol(arguments[0]).and_then(|symbol| vm.heap.string_text(symbol.name));
-    let is_there = name.is_some_and(|name| vm.outside.has_operation(&name));
+    let function = function_named(vm, arguments[0]);
+    let is_there = function.is_some_and(|function| vm.outside.is_operation(function));
     Ok(Value::boolean(is_there && vm.scheduler.task().critical == 0))
 }
 

@@ -46,12 +46,12 @@ pub(super) fn universal_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (name, data) = host_call(vm, arguments)?;
+    let (function, data) = host_call(vm, arguments)?;
     // The function has effects that cannot be done twice, so what it gives is kept until there is room for
     // it.
     let answer = match vm.outside.answer.take() {
         Some(answer) => answer,
-        None => match vm.outside.call(&name, &data) {
+        None => match function.and_then(|function| vm.outside.call(function, &data)) {
             Some(answer) => answer,
             None => return vm.exchange.raise(Raised::Cause("NOT-IN-THIS-WORLD", arguments[0])),
         },

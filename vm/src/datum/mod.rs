@@ -16,7 +16,6 @@ mod walk;
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::sync::Arc;
 
 use esl_bytecode::datum::{Datum, DatumKind, DatumRemains, ObjectId};
 use esl_bytecode::span::Span;
@@ -367,8 +366,7 @@ impl Unit {
         }
         let kind = self.atom_kind(heap, world, object);
         let datum = match kind {
-            Some(DatumKind::Symbol(symbol)) => Datum::symbol(symbol, span),
-            Some(kind) => Datum::new(kind, span),
+            Some(kind) => Datum::of_kind(kind, span),
             None => Datum::new(DatumKind::Object(self.pin(object)), span),
         };
         if matches!(datum.kind(), DatumKind::String(_)) {
@@ -402,8 +400,9 @@ impl Unit {
         {
             return Some(DatumKind::Opaque(opaque.clone()));
         }
-        let text: Option<String> = heap.string(object)?.iter().map(|&code| char::from_u32(code)).collect();
-        Some(DatumKind::String(Arc::from(text?)))
+        let is_text = heap.string(object)?.iter().all(|&code| char::from_u32(code).is_some());
+        let text = heap.string_text(object).filter(|_| is_text)?;
+        Some(DatumKind::String(text.into()))
     }
 
     /// As [`Unit::datum_of`]; an object that no datum can describe is represented as a whole.
@@ -470,6 +469,12 @@ fn is_equivalent(a: &Datum, b: &Datum) -> bool {
 /// [`DatumError`].
 pub(crate) fn export(heap: &Heap, world: &World, value: Value) -> Result<(Datum, usize), DatumError> {
     let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
+    // An atom shares nothing with other parts, so it needs neither walk nor memory.
+    if parts_of(heap, value).is_none()
+        && let Some(kind) = unit.atom_kind(heap, world, value)
+    {
+        return Ok((Datum::of_kind(kind, Span::default()), 1));
+    }
     let datum = unit.datum_of(heap, world, value, Span::default())?;
     Ok((datum, unit.take_work() as usize))
 }
@@ -483,7 +488,14 @@ pub(crate) fn import(
     world: &mut World,
     datum: &Datum,
 ) -> Result<(Value, usize), AllocError> {
+    // As in `export`.
+    if let DatumKind::String(text) = datum.kind() {
+        return Ok((heap.alloc_str(text)?, 1));
+    }
     let mut unit = Unit::default();
+    if !datum.is_compound() {
+        return Ok((unit.atom_value(heap, world, datum)?, 1));
+    }
     let value = unit.value_of(heap, world, datum)?;
     Ok((value, unit.take_work() as usize))
 }

@@ -1,7 +1,7 @@
 //! A host whose questions are counted into a canary: which they are, in their order, with their arguments.
 //! Answers are not; whatever they change in the run shows in what follows.
 
-use esl_bytecode::datum::Datum;
+use esl_bytecode::datum::{Datum, DatumKind};
 
 use super::{
     Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, HostState, Inbox, Incoming, Input,
@@ -77,8 +77,35 @@ impl Asked {
 
     fn note_call(&mut self, question: AskedQuestion, name: &str, arguments: &[Datum]) {
         self.note_bytes(question, name.as_bytes());
-        for argument in arguments {
-            self.canary.mix_bytes(argument.to_string().as_bytes());
+        arguments.iter().for_each(|argument| self.mix_datum(argument));
+    }
+
+    /// Mixes in a datum: what most arguments are as it is, anything else as its text.
+    fn mix_datum(&mut self, datum: &Datum) {
+        match datum.kind() {
+            DatumKind::Nil => self.canary.mix(0),
+            DatumKind::String(text) => {
+                self.canary.mix(1);
+                self.canary.mix_bytes(text.as_bytes());
+            }
+            DatumKind::Integer(number) if let Ok(number) = i64::try_from(number) => {
+                self.canary.mix(2);
+                self.canary.mix(number as u64);
+            }
+            DatumKind::Symbol(symbol) if let Some(package) = symbol.package() => {
+                self.canary.mix(3);
+                self.canary.mix_bytes(package.as_bytes());
+                self.canary.mix_bytes(symbol.name().as_bytes());
+            }
+            DatumKind::Opaque(opaque) => {
+                self.canary.mix(4);
+                self.canary.mix_bytes(opaque.kind().as_bytes());
+                self.canary.mix_bytes(opaque.text().as_bytes());
+            }
+            _ => {
+                self.canary.mix(5);
+                self.canary.mix_bytes(datum.to_string().as_bytes());
+            }
         }
     }
 }
@@ -229,6 +256,7 @@ impl Host for Asked {
 mod tests {
     use super::*;
     use crate::host::VirtualHost;
+    use esl_bytecode::span::Span;
 
     #[test]
     fn questions_and_arguments_count() {
@@ -253,6 +281,14 @@ mod tests {
             canary(|host| _ = host.permit(Right::Write, "a", &[])),
             canary(|host| host.begin("a", &[], &mut |_| {})),
             canary(|host| host.begin("b", &[], &mut |_| {})),
+            canary(|host| host.begin("b", &[Datum::nil(Span::default())], &mut |_| {})),
+            canary(|host| host.begin("b", &[Datum::integer(0, Span::default())], &mut |_| {})),
+            canary(|host| host.begin("b", &[Datum::integer(-1, Span::default())], &mut |_| {})),
+            canary(|host| host.begin("b", &[Datum::string("", Span::default())], &mut |_| {})),
+            canary(|host| host.begin("b", &[Datum::string("-1", Span::default())], &mut |_| {})),
+            canary(|host| {
+                host.begin("b", &[Datum::new(DatumKind::Float(-1.0), Span::default())], &mut |_| {})
+            }),
         ];
         for (i, one) in found.iter().enumerate() {
             assert!(!found[i + 1..].contains(one), "question {i}");

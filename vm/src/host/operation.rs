@@ -134,6 +134,11 @@ impl HostOperation {
         &self.arguments
     }
 
+    /// Takes the arguments of the call. There are none afterwards.
+    pub fn take_arguments(&mut self) -> Vec<Datum> {
+        std::mem::take(&mut self.arguments)
+    }
+
     fn tell(&self, news: News) {
         self.inbox.put(Incoming::Operation { number: self.number, news });
     }

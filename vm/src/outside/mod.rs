@@ -4,8 +4,10 @@
 mod operations;
 
 use std::collections::BTreeMap;
+use std::hash::{BuildHasherDefault, DefaultHasher};
 
 use esl_bytecode::datum::Datum;
+use indexmap::IndexMap;
 
 use crate::host::{Asked, Canceller, Console, Host, HostFailure, HostOperation, Inbox, Output, Right};
 use crate::task::TaskNumber;
@@ -39,6 +41,10 @@ pub(crate) struct Given {
     pub(crate) needs: Vec<Need>,
 }
 
+/// A function of the embedder's, by its place among those given to the machine. None is ever taken away.
+#[derive(Clone, Copy)]
+pub(crate) struct GivenIndex(usize);
+
 /// Everything through which a machine reaches the outside.
 pub(crate) struct Outside {
     /// Clocks, files and streams.
@@ -47,8 +53,8 @@ pub(crate) struct Outside {
     pub(crate) inbox: Inbox,
     /// The standard streams, buffered.
     pub(crate) console: Console,
-    /// The embedder's functions, by name.
-    pub(crate) functions: BTreeMap<String, Given>,
+    /// The embedder's functions, by name, in the order in which they were given.
+    pub(crate) functions: IndexMap<String, Given, BuildHasherDefault<DefaultHasher>>,
     /// Number of calls of these.
     pub(crate) calls: u64,
     /// Answer of one of them, while there is no room for it in the heap.
@@ -72,7 +78,7 @@ impl Outside {
             inbox: host.inbox(),
             host: Asked::new(host),
             console: Console::default(),
-            functions: BTreeMap::new(),
+            functions: IndexMap::default(),
             calls: 0,
             answer: None,
             operations: Operations::default(),
@@ -83,35 +89,45 @@ impl Outside {
         }
     }
 
-    /// Calls a function of the embedder's that returns at once; `None` if there is none of this name.
-    pub(crate) fn call(&mut self, name: &str, arguments: &[Datum]) -> Option<Result<Datum, HostFailure>> {
+    /// Returns the function of the embedder's with this name.
+    pub(crate) fn function(&self, name: &str) -> Option<GivenIndex> {
+        self.functions.get_index_of(name).map(GivenIndex)
+    }
+
+    /// Calls a function of the embedder's that returns at once; `None` if it begins an operation.
+    pub(crate) fn call(
+        &mut self,
+        function: GivenIndex,
+        arguments: &[Datum],
+    ) -> Option<Result<Datum, HostFailure>> {
         self.calls += 1;
-        match &mut self.functions.get_mut(name)?.function {
+        let (name, given) = self.functions.get_index_mut(function.0)?;
+        match &mut given.function {
             HostFunction::AtOnce(function) => Some(self.host.call(name, arguments, function)),
             HostFunction::Operation(_) => None,
         }
     }
 
-    /// Returns whether the embedder has an operation of this name.
-    pub(crate) fn has_operation(&self, name: &str) -> bool {
-        self.functions.get(name).is_some_and(|given| matches!(given.function, HostFunction::Operation(_)))
+    /// Returns whether a function of the embedder's begins an operation.
+    pub(crate) fn is_operation(&self, function: GivenIndex) -> bool {
+        matches!(self.functions[function.0].function, HostFunction::Operation(_))
     }
 
     /// Returns the rights that a function of the embedder's needs.
-    pub(crate) fn needs(&self, name: &str) -> Vec<Need> {
-        self.functions.get(name).map_or(Vec::new(), |given| given.needs.clone())
+    pub(crate) fn needs(&self, function: GivenIndex) -> Vec<Need> {
+        self.functions[function.0].needs.clone()
     }
 
     /// Begins an operation of the embedder's.
     pub(crate) fn begin_operation(
         &mut self,
-        name: &str,
+        function: GivenIndex,
         arguments: &[Datum],
         handle: Value,
         is_detached: bool,
         begun_by: TaskNumber,
     ) {
-        let Some(given) = self.functions.get_mut(name) else { return };
+        let Some((name, given)) = self.functions.get_index_mut(function.0) else { return };
         let HostFunction::Operation(function) = &mut given.function else { return };
         self.calls += 1;
         let canceller = Canceller::default();
