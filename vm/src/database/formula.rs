@@ -157,6 +157,11 @@ pub(super) fn fact(
         }
         while let Some(pair) = heap.as_cons(rest) {
             parts = parts.checked_sub(1).ok_or(FormulaError::Malformed(v, "a smaller fact"))?;
+            rest = pair.cdr;
+            if !pair.car.is_address() {
+                cells.push(Term(pair.car));
+                continue;
+            }
             let term =
                 convert(terms, heap, pair.car, &mut parts, &mut |_, heap, part| match part.is_address()
                     && variable_name(heap, part).is_some()
@@ -165,7 +170,6 @@ pub(super) fn fact(
                     false => Ok(None),
                 })?;
             cells.push(term);
-            rest = pair.cdr;
         }
         match rest {
             Value::NIL => Ok(()),

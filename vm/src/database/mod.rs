@@ -280,7 +280,19 @@ impl Database {
     }
 
     /// Releases some rows and terms that are no longer needed. Each change does a little of this.
+    #[inline]
     fn tidy(&mut self, heap: &mut Heap) {
+        let is_tidy = self.ended.is_empty()
+            && self.unlinked.is_empty()
+            && self.retired.is_empty()
+            && self.released.is_empty();
+        if !is_tidy {
+            self.release_some();
+        }
+        self.terms.sweep(heap, 8 * FREED_AT_ONCE);
+    }
+
+    fn release_some(&mut self) {
         let oldest = self.queries.keys().next().copied().unwrap_or(u64::MAX);
         for _ in 0..FREED_AT_ONCE {
             let Some(&ended) = self.ended.front() else { break };
@@ -315,6 +327,5 @@ impl Database {
                 None => _ = self.released.pop(),
             }
         }
-        self.terms.sweep(heap, 8 * FREED_AT_ONCE);
     }
 }

@@ -10,6 +10,7 @@ use crate::value::Value;
 
 impl Terms {
     /// Returns whether an object is a symbol with a package, which is permanent.
+    #[inline]
     fn is_named(heap: &Heap, v: Value) -> bool {
         heap.symbol(v).is_some_and(|symbol| symbol.package.is_true())
     }
@@ -49,6 +50,9 @@ impl Terms {
         if !v.is_address() {
             return Ok(Term(v));
         }
+        if Terms::is_named(heap, v) {
+            return Ok(Term(v));
+        }
         if let Some(characters) = equality::characters_of(heap, v) {
             let hash =
                 finish(characters.iter().fold(mix(3, characters.len() as u64), |h, &c| mix(h, c.into())));
@@ -69,7 +73,7 @@ impl Terms {
         if let Some(x) = heap.as_double(v) {
             return Ok(self.intern(finish(mix(6, x.to_bits())), TermData::Float(x.to_bits())));
         }
-        if Terms::is_named(heap, v) { Ok(Term(v)) } else { self.object(heap, v) }
+        self.object(heap, v)
     }
 
     /// Returns the object of a term. Adds the work done to `work`.
