@@ -65,6 +65,7 @@ impl Config {
     };
 
     /// Returns the limit of a task's stack in words.
+    #[inline]
     pub fn stack_words(&self) -> usize {
         self.stack.unwrap_or(self.memory / 2 / size_of::<u64>()).min(MAX_STACK)
     }

@@ -113,6 +113,7 @@ impl Cpu {
     }
 
     /// Takes the ticks of the slice that were used.
+    #[inline]
     pub(crate) fn take_used(&mut self) -> u64 {
         let used = self.used();
         self.reserve = 0;

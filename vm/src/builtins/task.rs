@@ -26,6 +26,7 @@ pub(super) fn expect_task(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
 }
 
 /// Returns whether a task has ended.
+#[inline]
 pub(super) fn has_ended(heap: &Heap, task: Value) -> bool {
     !heap.slot_or_nil(task, event::STATE).is_fixnum()
 }

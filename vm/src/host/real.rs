@@ -166,10 +166,12 @@ fn names_in(folder: &str) -> std::io::Result<Vec<String>> {
 }
 
 fn nanoseconds(duration: Duration) -> u64 {
-    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+    let whole = duration.as_secs().saturating_mul(1_000_000_000);
+    whole.saturating_add(duration.subsec_nanos().into())
 }
 
 /// Returns a duration times a factor, the longest there is if that is out of range.
+#[inline]
 fn scaled(duration: Duration, factor: f64) -> Duration {
     if factor == 1.0 {
         return duration;
@@ -179,8 +181,10 @@ fn scaled(duration: Duration, factor: f64) -> Duration {
 
 impl Host for RealHost {
     fn monotonic(&mut self) -> u64 {
-        let elapsed = self.start.elapsed();
-        self.virtual_time.unwrap_or_else(|| nanoseconds(scaled(elapsed, self.speed)))
+        match self.virtual_time {
+            Some(time) => time,
+            None => nanoseconds(scaled(self.start.elapsed(), self.speed)),
+        }
     }
 
     #[cfg(unix)]

@@ -25,11 +25,13 @@ impl Vm {
     }
 
     /// Words that the running task's stack may have now.
+    #[inline]
     fn stack_limit(&self) -> usize {
         self.config.stack_words() + if self.scheduler.task().flags.uses_reserve() { RESERVE } else { 0 }
     }
 
     /// Address up to which the running task's stack may be used: its end, or its limit if that comes first.
+    #[inline]
     pub(super) fn stack_end(&self) -> *mut Value {
         let stack = &self.scheduler.task().stack;
         // SAFETY: the offset is at most the capacity of the stack.

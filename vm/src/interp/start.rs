@@ -118,17 +118,16 @@ pub(crate) fn drop_frames(vm: &mut Vm) {
         unsafe { task.stack.start().copy_to_nonoverlapping(stack.start(), EXIT_BASE as usize) };
         let large = std::mem::replace(&mut task.stack, stack);
         vm.scheduler.tasks.discard(large);
+        let stack_end = vm.stack_end();
+        // SAFETY: F1: it is that of the stack that the running task has now.
+        unsafe { vm.cpu.set_stack_end(stack_end) };
     } else {
         task.stack.wipe(EXIT_BASE as usize);
     }
-    let stack_end = vm.stack_end();
     let start = vm.scheduler.task().stack.start();
     // A collection may still come in this turn, and takes the running frame from the registers.
     // SAFETY: F1: every stack begins with the link of the frame whose base this is.
-    unsafe {
-        vm.cpu.set_base(start.add(EXIT_BASE as usize));
-        vm.cpu.set_stack_end(stack_end);
-    }
+    unsafe { vm.cpu.set_base(start.add(EXIT_BASE as usize)) };
 }
 
 /// Makes the function with which every task begins: `(apply R0 R2)` as a tail call.

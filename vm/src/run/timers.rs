@@ -9,7 +9,7 @@ use super::operation::expects_news;
 use super::tell_how_far;
 use super::wake::{call_attention, make_runnable};
 use crate::host::{Awaited, Host, Wake};
-use crate::schedule::Due;
+use crate::schedule::{Due, Scheduler};
 use crate::task::Task;
 use crate::vm::Vm;
 
@@ -21,23 +21,26 @@ const VIRTUAL_TICKS: u64 = 10_000_000;
 const AT_ONCE: usize = 1000;
 
 /// Asks the clock if it is time to, and fires the timers that are due.
+#[inline(always)]
 pub(super) fn look_at_clock(vm: &mut Vm) {
-    let scheduler = &mut vm.scheduler;
-    if scheduler.timers.first().is_none() {
-        return;
+    let Scheduler { timers, clock, spent, .. } = &vm.scheduler;
+    let wait = if clock.is_virtual { VIRTUAL_TICKS } else { CLOCK_TICKS };
+    let since = if clock.is_virtual { clock.moved_at } else { clock.looked_at };
+    if !timers.is_empty() && (clock.more_is_due || spent.saturating_sub(since) >= wait) {
+        ask_clock(vm);
     }
+}
+
+/// Asks the clock, and fires the timers that are due. There are timers.
+fn ask_clock(vm: &mut Vm) {
+    let scheduler = &mut vm.scheduler;
     if scheduler.clock.more_is_due {
         return fire_timers(vm);
     }
     if scheduler.clock.is_virtual {
-        if scheduler.spent.saturating_sub(scheduler.clock.moved_at) < VIRTUAL_TICKS {
-            return;
-        }
         let Some(first) = scheduler.first_timer() else { return };
         let now = scheduler.clock.read(&mut vm.outside.host);
         vm.outside.host.advance(first.saturating_sub(now));
-    } else if scheduler.spent.saturating_sub(scheduler.clock.looked_at) < CLOCK_TICKS {
-        return;
     }
     scheduler.clock.looked_at = scheduler.spent;
     fire_timers(vm);

@@ -290,39 +290,40 @@ fn note_end_of_turn(vm: &mut Vm, leave: Leave) {
 }
 
 /// Notes that the task with this index has come to wait.
+#[inline(always)]
 fn park_task(vm: &mut Vm, index: TaskIndex) {
     let scheduler = &mut vm.scheduler;
     let parking = std::mem::take(&mut scheduler.turn.parking);
     let serial = scheduler.serial.advance();
-    let Some(id) = scheduler.tasks.id_at(index) else { return };
     let Some(task) = scheduler.tasks.at_mut(index) else { return };
     task.serial = serial;
     trim(&mut vm.heap, task);
+    // Something was noted while it was about to wait.
+    let goes_on = task.flags.attention() && !scheduler.turn.had_attention;
     match parking {
-        Parking::Input => {
-            task.state = TaskState::Reading;
-            scheduler.readers.push(id);
-        }
-        Parking::Output => {
-            task.state = TaskState::Writing;
-            scheduler.writers.push(id);
-        }
         Parking::Wait(deadline) => {
             task.state = TaskState::Waiting;
             if let Some(deadline) = deadline {
                 scheduler.timers.push(deadline, index, Due::Wait(serial));
             }
         }
+        Parking::Input => {
+            task.state = TaskState::Reading;
+            scheduler.readers.extend(scheduler.tasks.id_at(index));
+        }
+        Parking::Output => {
+            task.state = TaskState::Writing;
+            scheduler.writers.extend(scheduler.tasks.id_at(index));
+        }
     }
     report::note(vm, index, Happening::Waits);
-    let scheduler = &vm.scheduler;
-    if !scheduler.turn.had_attention && scheduler.tasks.at(index).is_some_and(|task| task.flags.attention()) {
-        // Something was noted while it was about to wait.
+    if goes_on {
         make_runnable(vm, index, true);
     }
 }
 
 /// Gives back most of a stack that is much too large for what is on it, if it was the last time too.
+#[inline]
 fn trim(heap: &mut Heap, task: &mut Task) {
     let capacity = task.stack.capacity();
     let is_oversized = capacity > 64 && interp::top_of_task(task) < capacity / 4;

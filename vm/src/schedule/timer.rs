@@ -83,6 +83,12 @@ impl Timers {
         timers
     }
 
+    /// Returns whether there are none.
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.heap.is_empty()
+    }
+
     /// Returns the first timer.
     pub(crate) fn first(&self) -> Option<Timer> {
         self.heap.peek().map(|&Reverse(timer)| timer)

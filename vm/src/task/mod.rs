@@ -370,6 +370,7 @@ impl Task {
     }
 
     /// Returns the ticks that its cleanups may still use; `None` if they have no allowance, or none runs.
+    #[inline]
     pub(crate) fn cleanup_ticks_left(&self) -> Option<u64> {
         let bound = self.control.get()?.bound();
         (bound.ticks != u64::MAX).then(|| bound.ticks.saturating_sub(self.ticks))

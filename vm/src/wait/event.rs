@@ -49,11 +49,13 @@ pub(crate) fn count(heap: &Heap, event: Value) -> i64 {
 }
 
 /// Counts a signal of an event.
+#[inline]
 pub(crate) fn count_signal(heap: &mut Heap, event: Value) {
-    if let Some(slots) = slots_mut(heap, event) {
-        let count = slots[COUNT].as_fixnum().unwrap_or(0) + 1;
-        slots[COUNT] = Value::fixnum(count).unwrap_or(Value::small(0));
-    }
+    let Some(kind) = heap.kind(event) else { return };
+    // One slot is set alone: while the collector marks, setting several costs more.
+    let Some(&[_, count]) = heap.slots(event, kind) else { return };
+    let count = count.as_fixnum().unwrap_or(0) + 1;
+    heap.record_set(event, kind, COUNT, Value::fixnum(count).unwrap_or(Value::small(0)));
 }
 
 /// Returns the slots that every event has, to be set.
@@ -64,11 +66,13 @@ pub(super) fn slots_mut(heap: &mut Heap, event: Value) -> Option<&mut [Value; LE
 }
 
 /// Returns whether a wait for an event is open.
+#[inline]
 pub(crate) fn is_awaited(heap: &Heap, event: Value) -> bool {
     heap.slot_or_nil(event, FIRST).is_true()
 }
 
 /// Returns the place of the task that `object` stands for, while it lives.
+#[inline]
 pub(crate) fn task_index(heap: &Heap, object: Value) -> Option<TaskIndex> {
     heap.slot_or_nil(object, STATE).as_index().map(|index| TaskIndex(index as u32))
 }

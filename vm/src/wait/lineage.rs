@@ -10,20 +10,29 @@
 //! a time.
 
 use super::event;
-use crate::heap::{AllocError, Heap};
+use crate::heap::{AllocError, Heap, Kind};
 use crate::task::TaskIndex;
 use crate::value::Value;
 
 /// Most nodes of ended tasks that are skipped in one step.
 const AT_ONCE: usize = 1000;
 
+/// Returns the index of a living task, as a value, and its node or that of its maker.
+#[inline]
+fn place_of(heap: &Heap, task: Value) -> (Value, Value) {
+    match heap.slots::<{ event::TASK_LENGTH }>(task, Kind::Task) {
+        Some(slots) => (slots[event::STATE], slots[event::RESULT]),
+        None => (Value::NIL, Value::NIL),
+    }
+}
+
 /// Returns the node of a task that is about to make another, a new one if it has none.
 ///
 /// # Errors
 /// As for every allocation; then nothing has happened.
+#[inline]
 pub(crate) fn node_of(heap: &mut Heap, task: Value) -> Result<Value, AllocError> {
-    let node = heap.slot_or_nil(task, event::RESULT);
-    let own = heap.slot_or_nil(task, event::STATE);
+    let (own, node) = place_of(heap, task);
     if heap.as_cons(node).is_some_and(|pair| pair.car == own) {
         return Ok(node);
     }
@@ -33,10 +42,11 @@ pub(crate) fn node_of(heap: &mut Heap, task: Value) -> Result<Value, AllocError>
 }
 
 /// Notes in the tree that a task ends. Its index and its node have to be in their places still.
+#[inline]
 pub(crate) fn end(heap: &mut Heap, task: Value) {
-    let node = heap.slot_or_nil(task, event::RESULT);
+    let (own, node) = place_of(heap, task);
     let Some(pair) = heap.as_cons(node) else { return };
-    if pair.car == heap.slot_or_nil(task, event::STATE) {
+    if pair.car == own {
         heap.set_car(node, Value::NIL);
         skip_ended(heap, node);
     }
@@ -63,8 +73,7 @@ fn skip_ended(heap: &mut Heap, node: Value) {
 
 /// Returns the place of the task that a living task belongs to, if it belongs to one.
 pub(crate) fn owner_of(heap: &Heap, task: Value) -> Option<TaskIndex> {
-    let own = heap.slot_or_nil(task, event::STATE);
-    let mut node = heap.slot_or_nil(task, event::RESULT);
+    let (own, mut node) = place_of(heap, task);
     while let Some(pair) = heap.as_cons(node) {
         if pair.car != own
             && let Some(index) = pair.car.as_index()
@@ -79,7 +88,6 @@ pub(crate) fn owner_of(heap: &Heap, task: Value) -> Option<TaskIndex> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::heap::Kind;
     use crate::trust::heap_for_tests;
 
     fn task(heap: &mut Heap, index: usize, node: Value) -> Value {

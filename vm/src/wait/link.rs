@@ -55,6 +55,7 @@ impl Default for WaitOptions {
     }
 }
 
+#[inline]
 fn flags(heap: &Heap, wait: Value) -> u8 {
     heap.header(wait).map_or(0, |header| header.flags)
 }
@@ -126,11 +127,13 @@ pub(crate) fn wait_and_next(heap: &Heap, link: Value) -> (Value, Value) {
 }
 
 /// Returns the object of the task that waits.
+#[inline]
 pub(crate) fn owner(heap: &Heap, wait: Value) -> Value {
     heap.slot_or_nil(wait, OWNER)
 }
 
 /// Returns the link of the wait for `event` that began first, or `NIL`.
+#[inline]
 pub(crate) fn first(heap: &Heap, event: Value) -> Value {
     heap.slot_or_nil(event, event::FIRST)
 }
@@ -141,16 +144,19 @@ pub(crate) fn deadline(heap: &Heap, wait: Value) -> Option<u64> {
 }
 
 /// Returns whether a wait keeps signals.
+#[inline]
 pub(crate) fn keeps(heap: &Heap, wait: Value) -> bool {
     flags(heap, wait) & KEEPS != 0
 }
 
 /// Returns whether the waiting task goes on without delay.
+#[inline]
 pub(crate) fn is_urgent(heap: &Heap, wait: Value) -> bool {
     flags(heap, wait) & URGENT != 0
 }
 
 /// Returns whether a wait is for the end of a child.
+#[inline]
 pub(crate) fn is_for_child(heap: &Heap, wait: Value) -> bool {
     flags(heap, wait) & CHILD != 0
 }
@@ -256,11 +262,13 @@ pub(crate) fn set_signalled(heap: &mut Heap, deliveries: &mut Deliveries, wait: 
 }
 
 /// Returns the arguments of the signal that a wait was for, if it has come.
+#[inline]
 pub(crate) fn signalled(heap: &Heap, wait: Value) -> Option<Value> {
     (flags(heap, wait) & SIGNALLED != 0).then(|| heap.slot_or_nil(wait, QUEUE))
 }
 
 /// Appends a cons to the queue of a wait that keeps signals.
+#[inline]
 pub(crate) fn enqueue(heap: &mut Heap, wait: Value, cell: Value) {
     let queue = heap.slot_or_nil(wait, QUEUE);
     match heap.cdr(queue) {
