@@ -190,7 +190,7 @@ impl Heap {
     #[inline(never)]
     fn allocate_slow(&mut self, bytes: usize) -> Result<NonNull<u8>, AllocError> {
         if is_large(bytes) {
-            return self.allocate_large(bytes);
+            return self.allocate_large(bytes, self.has_images);
         }
         let which = if bytes <= SMALL { Which::First } else { Which::Second };
         if let Some(p) = self.region(which).bump(bytes) {
@@ -372,13 +372,19 @@ impl Heap {
         self.stats.peak = self.stats.peak.max(self.committed as u64);
     }
 
-    fn allocate_large(&mut self, bytes: usize) -> Result<NonNull<u8>, AllocError> {
+    /// Returns memory of its own for a large object, all of it zero if it `is_zeroed`. The system gives that
+    /// without touching it.
+    pub(super) fn allocate_large(
+        &mut self,
+        bytes: usize,
+        is_zeroed: bool,
+    ) -> Result<NonNull<u8>, AllocError> {
         self.check_room(footprint(bytes)).map_err(|error| match error {
             AllocError::TooLarge { .. } => AllocError::TooLarge { requested: bytes },
             error => error,
         })?;
         // The current epoch: marked while marking and not yet swept while sweeping; stale by the next cycle.
-        let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch, self.has_images)
+        let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch, is_zeroed)
             .ok_or(AllocError::NeedCollection)?;
         let object = large.object();
         self.large.push(large);

@@ -142,19 +142,22 @@ impl Heap {
 
     /// Creates a vector or string of `len` elements for [`Heap::fill_more`] to fill piece by piece, since the
     /// system takes its time for memory that is touched for the first time. One that is not large is filled
-    /// at once, with 0 or the character of code 0.
+    /// at once, with 0 or the character of code 0. One that is to be filled with that is not touched at all.
     pub fn begin_vector(&mut self, len: usize, is_string: bool) -> Result<Value, AllocError> {
         let kind = if is_string { Kind::UnfinishedString } else { Kind::UnfinishedVector };
-        if !super::large::is_large(kind.size(len)) {
+        if len <= MAX_LENGTH && !super::large::is_large(kind.size(len)) {
             return if is_string {
                 self.alloc_string_filled(len, 0)
             } else {
                 self.alloc_vector_filled(len, Value::small(0))
             };
         }
-        let object = self.begin_object(kind, 0, 0, len)?;
+        let bytes = object_bytes(kind, len)?;
+        let object = self.allocate_large(bytes, true)?.as_ptr().cast::<Header>();
+        // SAFETY: `allocate_large` gave us at least 16 aligned bytes of our own.
+        unsafe { object.write(Header { kind, flags: 0, aux: 0, len: len as u32 }) };
         // SAFETY: nobody reads the elements of an unfinished object: the collector does not look inside, and
-        // `access` has nothing for these kinds.
+        // `access` has nothing for these kinds. They are zero, which is an element of either kind.
         Ok(unsafe { Value::from_object(object) })
     }
 
@@ -164,8 +167,8 @@ impl Heap {
     pub fn fill_more(&mut self, v: Value, fill: Value, count: usize) -> Option<bool> {
         let object = v.as_object_ptr()?;
         // SAFETY: H1, H2: an object value is the address of a live object. If it is unfinished it is large,
-        // so that it has a large header, and its elements from `filled` to `len` are ours to write. When all
-        // are written it is what its new kind says.
+        // so that it has a large header, and its elements from `filled` to `len` are ours to write, and still
+        // zero. When all are written it is what its new kind says.
         unsafe {
             let finished = match (*object).kind {
                 Kind::UnfinishedVector => Kind::SimpleVector,
@@ -178,12 +181,16 @@ impl Heap {
             if finished == Kind::String {
                 let code = fill.as_character().unwrap_or(0);
                 let characters = object.add(1).cast::<u32>();
-                (from..to).for_each(|i| characters.add(i).write(code));
+                if code != 0 {
+                    (from..to).for_each(|i| characters.add(i).write(code));
+                }
             } else {
                 // The collector does not look inside, so it would not find an address.
                 let fill = if fill.is_address() { Value::small(0) } else { fill };
                 let values = object.add(1).cast::<Value>();
-                (from..to).for_each(|i| values.add(i).write(fill));
+                if fill.bits() != 0 {
+                    (from..to).for_each(|i| values.add(i).write(fill));
+                }
             }
             (*large).filled = to as u32;
             if to == len {
@@ -288,10 +295,7 @@ impl Heap {
         aux: u16,
         len: usize,
     ) -> Result<*mut Header, AllocError> {
-        if len > MAX_LENGTH {
-            return Err(AllocError::TooLarge { requested: len.saturating_mul(1 << kind.element_shift()) });
-        }
-        let object = self.allocate(kind.size(len))?.as_ptr().cast::<Header>();
+        let object = self.allocate(object_bytes(kind, len)?)?.as_ptr().cast::<Header>();
         // SAFETY: `allocate` gave us at least 16 aligned bytes of our own.
         unsafe { object.write(Header { kind, flags, aux, len: len as u32 }) };
         Ok(object)
@@ -335,6 +339,17 @@ pub(super) const fn is_vouched_for(kind: Kind) -> bool {
     matches!(kind, Kind::Symbol | Kind::Function | Kind::Array | Kind::Structure | Kind::HashTable)
 }
 
+/// Returns the bytes of an object of this kind with so many elements.
+///
+/// # Errors
+/// [`AllocError::TooLarge`] if no object can be as long.
+fn object_bytes(kind: Kind, len: usize) -> Result<usize, AllocError> {
+    match len {
+        0..=MAX_LENGTH => Ok(kind.size(len)),
+        _ => Err(AllocError::TooLarge { requested: len.saturating_mul(1 << kind.element_shift()) }),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -354,6 +369,16 @@ mod tests {
         let elements = heap.vector(v).unwrap();
         assert_eq!((elements.len(), elements[LONG - 2], elements[LONG - 1]), (LONG, Value::T, Value::NIL));
         assert_eq!((heap.fill_more(v, Value::T, 1), heap.filled(v)), (None, None), "it is finished");
+    }
+
+    #[test]
+    fn long_vectors_are_filled_with_zero() {
+        let mut heap = Heap::for_tests();
+        let v = heap.begin_vector(LONG, false).unwrap();
+        assert_eq!(heap.fill_more(v, Value::small(0), LONG / 2), Some(false));
+        assert_eq!(heap.fill_more(v, Value::small(0), LONG), Some(true));
+        assert!(heap.vector(v).unwrap().iter().all(|&element| element == Value::small(0)));
+        heap.check().unwrap();
     }
 
     #[test]
