@@ -105,7 +105,7 @@ state! {
     Task by VisitTask :: task_content {
         content { flags, priority, critical, state, wait, notify, stack, control, account, extra }
         course { object, ticks, serial, number, turns, pc by nothing, base }
-        derived { scanned, counted }
+        derived { scanned, counted, has_deadline }
     }
 }
 

@@ -365,7 +365,12 @@ pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Some(deadline) if time_of_task(vm) >= deadline => Ok(vm.world.known.timeout),
         deadline => {
             let deadline = deadline.map(|time| vm.scheduler.standstill().when(time));
-            vm.scheduler.park_at(wait, deadline)
+            let parks = vm.scheduler.park_at(wait, deadline);
+            if latest.is_some() {
+                // It ends this call, not the wait.
+                vm.scheduler.task_mut().has_deadline = link::deadline(&vm.heap, wait).is_some();
+            }
+            parks
         }
     }
 }

@@ -1,13 +1,17 @@
 //! Suspension of trees of tasks: finding their members, and those that stand still where they wait.
+//!
+//! What takes time here is to fetch the records and the objects of tasks from memory. So there is a pass of
+//! its own for each of these, in which the processor asks for the next one while it still waits for others.
 
 use smallvec::{SmallVec, smallvec};
 
 use crate::builtins::LIMIT;
 use crate::builtins::expect::exactly;
 use crate::builtins::task::expect_task;
+use crate::heap::Heap;
 use crate::raise::{Exit, Outcome};
 use crate::run;
-use crate::task::{TaskIndex, TaskState};
+use crate::task::{Rest, TaskIndex, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, lineage};
@@ -20,8 +24,9 @@ fn index_argument(vm: &mut Vm, v: Value) -> Result<usize, Exit> {
     }
 }
 
-/// The depths of the tasks of a tree, in which `root` has depth 1. `known` is a vector of those that are
-/// known, by the places of the tasks; a task that is not of the tree has 0.
+/// The depths of the tasks of a tree, in which `root` has depth 1; a task that is not of the tree has 0.
+/// `known` is a vector of those that are known, plus one, by the places of the tasks, and of 0 for the
+/// others. Most trees are so flat that it is not looked at, and memory that is not looked at costs nothing.
 #[derive(Clone, Copy)]
 struct Depths {
     root: TaskIndex,
@@ -34,19 +39,22 @@ impl Depths {
         if place == self.root {
             return Some(1);
         }
-        vm.heap.vector(self.known)?.get(place.as_usize())?.as_index()
+        vm.heap.vector(self.known)?.get(place.as_usize())?.as_index()?.checked_sub(1)
     }
 
     /// Returns the depth of the task `object`, at `place`. Adds the number of steps to `work`.
     fn find(self, vm: &mut Vm, place: TaskIndex, object: Value, work: &mut usize) -> usize {
-        if let Some(depth) = self.known(vm, place) {
-            return depth;
+        if place == self.root {
+            return 1;
         }
         match lineage::owner_of(&vm.heap, object) {
             // Most have been made by the root, and it takes no longer to find that again than to note it.
             Some(owner) if owner == self.root => 2,
-            Some(owner) => self.find_by_owner(vm, place, owner, work),
-            None => 0,
+            owner => match (self.known(vm, place), owner) {
+                (Some(depth), _) => depth,
+                (None, Some(owner)) => self.find_by_owner(vm, place, owner, work),
+                (None, None) => 0,
+            },
         }
     }
 
@@ -69,7 +77,7 @@ impl Depths {
         // By reference, since a path has much room that would be moved.
         for &place in path.iter().rev() {
             depth += usize::from(depth > 0);
-            vm.heap.vector_set(self.known, place.as_usize(), Value::index(depth));
+            vm.heap.vector_set(self.known, place.as_usize(), Value::index(depth + 1));
         }
         depth
     }
@@ -88,15 +96,20 @@ pub(super) fn tree_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (above, below, end) = (above? as u64, below? as u64, end?);
     let begin = end.saturating_sub(LIMIT);
     let depths = Depths { root, known: depths };
-    let mut members = Vec::with_capacity(end - begin);
-    let mut work = end - begin;
-    for place in (begin..end).map(|place| TaskIndex(place as u32)) {
+    let mut candidates = Vec::with_capacity(end - begin);
+    // None is looked at if none was made since the last look.
+    let places = if above < below { begin..end } else { end..end };
+    for place in places.map(|place| TaskIndex(place as u32)) {
         let Some(task) = vm.scheduler.find(place) else { continue };
         let (number, object) = (task.number.0, task.object);
         // Of those that are newer nothing is known: their places may have been those of others.
-        if task.state == TaskState::Ended || number <= above || number > below {
-            continue;
+        if task.state != TaskState::Ended && number > above && number <= below {
+            candidates.push((place, object));
         }
+    }
+    let mut members = Vec::with_capacity(candidates.len());
+    let mut work = end - begin;
+    for (place, object) in candidates {
         let depth = depths.find(vm, place, object, &mut work);
         if depth > 0 {
             members.push((depth - 1, object));
@@ -110,7 +123,8 @@ pub(super) fn tree_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let depth = run[0].0;
         let others = vm.heap.vector(generations).and_then(|lists| lists.get(depth).copied());
         let end = start + run.len();
-        let list = vm.heap.list_with_tail(&objects[start..end], others.unwrap_or(Value::NIL))?;
+        let tail = others.filter(|others| others.is_cons()).unwrap_or(Value::NIL);
+        let list = vm.heap.list_with_tail(&objects[start..end], tail)?;
         lists.push((depth, list));
         start = end;
     }
@@ -122,48 +136,68 @@ pub(super) fn tree_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[Value::index(begin), Value::index(deepest)])
 }
 
+/// The first tasks of a list, as many as a builtin sees to at once.
+struct Listed {
+    objects: Vec<Value>,
+    /// Their places; [`TaskIndex::NONE`] for those that have ended.
+    places: Vec<TaskIndex>,
+    /// The rest of the list.
+    rest: Value,
+}
+
+impl Listed {
+    /// Returns the first tasks of `list`, up to the cell `end`.
+    fn new(heap: &Heap, list: Value, end: Value) -> Listed {
+        let mut objects = Vec::with_capacity(LIMIT);
+        let mut rest = list;
+        while objects.len() < LIMIT
+            && rest != end
+            && let Some(pair) = heap.as_cons(rest)
+        {
+            objects.push(pair.car);
+            rest = pair.cdr;
+        }
+        let place = |&object: &Value| event::task_index(heap, object).unwrap_or(TaskIndex::NONE);
+        let places = objects.iter().map(place).collect();
+        Listed { objects, places, rest }
+    }
+
+    /// Returns the places of those that are or can be at rest, and the others.
+    fn divide(&self, rests: impl Fn(TaskIndex) -> bool) -> (Vec<TaskIndex>, Vec<Value>) {
+        let (mut resting, mut others) = (Vec::with_capacity(self.places.len()), Vec::new());
+        for (&place, &task) in self.places.iter().zip(&self.objects) {
+            if rests(place) {
+                resting.push(place);
+            } else if place != TaskIndex::NONE {
+                others.push(task);
+            }
+        }
+        (resting, others)
+    }
+}
+
 pub(super) fn begin_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let [tasks, stops_clock] = exactly(arguments);
-    let (mut resting, mut others) = (Vec::new(), Vec::new());
-    let mut rest = tasks;
-    for _ in 0..LIMIT {
-        let Some(pair) = vm.heap.as_cons(rest) else { break };
-        rest = pair.cdr;
-        let task = expect_task(vm, pair.car)?;
-        let Some(index) = event::task_index(&vm.heap, task) else { continue };
-        match vm.scheduler.tasks.at(index) {
-            Some(task) if run::can_rest(vm, task) => resting.push(index),
-            _ => others.push(task),
-        }
-    }
+    let tasks = Listed::new(&vm.heap, tasks, Value::NIL);
+    let (resting, others) = tasks.divide(|place| run::can_rest(vm, place));
     let others = vm.heap.list(&others)?;
     vm.exchange.charge(64 * resting.len());
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
     run::begin_rest(vm, &resting, stops_clock.is_true(), now);
-    vm.give_values(&[others, rest])
+    vm.give_values(&[others, tasks.rest])
 }
 
 pub(super) fn resume_from_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let [tasks, end] = exactly(arguments);
-    let (mut resting, mut others) = (Vec::new(), Vec::new());
-    let mut rest = tasks;
-    for _ in 0..LIMIT {
-        let Some(pair) = vm.heap.as_cons(rest).filter(|_| rest != end) else { break };
-        rest = pair.cdr;
-        let task = expect_task(vm, pair.car)?;
-        let Some(index) = event::task_index(&vm.heap, task) else { continue };
-        match vm.scheduler.find(index) {
-            Some(task) if task.flags.rests() => resting.push(index),
-            _ => others.push(task),
-        }
-    }
+    let tasks = Listed::new(&vm.heap, tasks, end);
+    let (resting, others) = tasks.divide(|place| vm.scheduler.tasks.rest(place) != Rest::None);
     let others = vm.heap.list(&others)?;
     vm.exchange.charge(64 * resting.len());
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
     run::resume_from_rest(vm, &resting, now);
-    vm.give_values(&[rest, others])
+    vm.give_values(&[tasks.rest, others])
 }
 
 pub(super) fn end_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -103,7 +103,9 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let known = &vm.world.known;
     let task = vm.scheduler.tasks.at(index);
     Ok(match task.map(|task| task.state) {
-        Some(TaskState::Waiting) if task.is_some_and(|task| task.flags.suspended()) => known.suspended,
+        Some(TaskState::Waiting) if task.is_some_and(|task| vm.scheduler.is_suspended(&vm.heap, task)) => {
+            known.suspended
+        }
         Some(TaskState::Waiting | TaskState::Reading | TaskState::Writing) => known.waiting,
         _ => known.running,
     })

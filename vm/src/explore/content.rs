@@ -66,6 +66,7 @@ impl VisitScheduler for Walk<'_> {
             let index = event::task_index(&self.vm.heap, task.object);
             let standstill = index.map(|index| scheduler.tasks.standstill(index));
             self.word(standstill.map_or(0, |standstill| u64::from(standstill.times)));
+            self.word(index.map_or(0, |index| scheduler.tasks.rest(index) as u64));
             self.task_content(task);
         }
     }

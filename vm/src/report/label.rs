@@ -60,7 +60,8 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
         return "room for output".into();
     }
     let index = event::task_index(&vm.heap, task.object);
-    if let Some(by) = index.and_then(|index| vm.scheduler.tasks.standstill(index).by) {
+    let by = index.map_or(Value::NIL, |index| vm.scheduler.tasks.standstill(index).by);
+    if by.is_true() {
         return format!("RESUME-TASK, suspended by {}", event_label(vm, by));
     }
     if task.wait.is_nil() {

@@ -3,7 +3,7 @@
 use super::{cause_label, event_label, label_of, place_in_program, reason_of, report_in_short, task_label};
 use crate::host::FailureRow;
 use crate::observe::{Coming, Observer, Seen};
-use crate::task::{Flags, TaskIndex, TaskNumber, TaskState};
+use crate::task::{TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -16,23 +16,23 @@ impl Vm {
         watch.observers.list.push(observer);
         watch.update_is_watched();
         let time = watch.observers.time(&mut outside.host, scheduler);
-        let tasks: Vec<(TaskNumber, String, Flags, Option<String>)> = self
+        let tasks: Vec<(TaskNumber, String, [bool; 2], Option<String>)> = self
             .scheduler
             .tasks
             .iter()
             .filter(|task| task.state != TaskState::Ended)
             .map(|task| {
                 let reason = (task.state != TaskState::Runnable).then(|| reason_of(self, task));
-                (task.number, task_label(self, task.object), task.flags, reason)
+                let is_suspended = self.scheduler.is_suspended(&self.heap, task);
+                (task.number, task_label(self, task.object), [task.flags.hidden(), is_suspended], reason)
             })
             .collect();
         let Some(observer) = self.watch.observers.list.last_mut() else { return };
-        for (number, name, flags, reason) in tasks {
-            let is_hidden = flags.hidden();
+        for (number, name, [is_hidden, is_suspended], reason) in tasks {
             observer.see(time, number, Seen::Begins { name: &name, is_hidden });
             let seen = match &reason {
                 None => Seen::IsReady,
-                Some(reason) if flags.suspended() => Seen::IsSuspended(reason),
+                Some(reason) if is_suspended => Seen::IsSuspended(reason),
                 Some(reason) => Seen::Waits(reason),
             };
             observer.see(time, number, seen);

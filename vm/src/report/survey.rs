@@ -44,7 +44,7 @@ impl Vm {
         let (mut chosen, mut named): (Vec<&Task>, Vec<&Task>) = (Vec::new(), Vec::new());
         let mut counts = [0; 4];
         for task in self.scheduler.tasks.iter().filter(|task| is_of_program(self, task)) {
-            counts[standing_of(task) as usize] += 1;
+            counts[standing_of(self, task) as usize] += 1;
             if request.tasks > 0 && task.number.0 > request.after {
                 chosen.push(task);
             } else if request.named.contains(&task.number.0) {
@@ -95,9 +95,9 @@ fn is_of_program(vm: &Vm, task: &Task) -> bool {
     task.state != TaskState::Ended && !task.flags.hidden() && !(task.flags.kept() && is_call())
 }
 
-fn standing_of(task: &Task) -> TaskStanding {
+fn standing_of(vm: &Vm, task: &Task) -> TaskStanding {
     match task.state {
-        _ if task.flags.suspended() => TaskStanding::Suspended,
+        _ if vm.scheduler.is_suspended(&vm.heap, task) => TaskStanding::Suspended,
         TaskState::Runnable | TaskState::Ended => TaskStanding::Ready,
         TaskState::Waiting => TaskStanding::Waits,
         TaskState::Reading | TaskState::Writing => TaskStanding::WaitsForStream,
@@ -115,7 +115,7 @@ pub(super) fn row_of(vm: &Vm, task: &Task, owners: &BTreeMap<u64, u64>) -> Surve
         number: task.number.0,
         maker: maker_of(vm, task),
         name: task_label(vm, task.object),
-        standing: standing_of(task),
+        standing: standing_of(vm, task),
         waits_for: (task.state != TaskState::Runnable).then(|| reason_of(vm, task)),
         held_by: holders_of(vm, task, owners),
         place: program_place(vm, task),

@@ -54,7 +54,7 @@ fn note_for_watchers(vm: &mut Vm, index: TaskIndex, happening: Happening) {
             show(vm, number, Seen::IsReady);
         }
         Happening::Waits => {
-            let (is_suspended, reason) = (task.flags.suspended(), reason_of(vm, task));
+            let (is_suspended, reason) = (vm.scheduler.is_suspended(&vm.heap, task), reason_of(vm, task));
             show(vm, number, if is_suspended { Seen::IsSuspended(&reason) } else { Seen::Waits(&reason) });
         }
         Happening::GoesOn => show(vm, number, Seen::IsReady),

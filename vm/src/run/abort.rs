@@ -4,7 +4,7 @@ use super::rest::end_rest;
 use super::wake::call_attention;
 use crate::report::{self, Happening};
 use crate::schedule::EndOfAll;
-use crate::task::{TaskId, TaskNumber, TaskState};
+use crate::task::{Rest, TaskId, TaskNumber, TaskState};
 use crate::vm::Vm;
 
 /// Tasks that are asked to end in one step.
@@ -18,7 +18,7 @@ impl Vm {
             return;
         }
         // Nothing but its end reaches one at rest, and that does.
-        if self.scheduler.find(id.index).is_some_and(|task| task.flags.rests()) {
+        if self.scheduler.tasks.rest(id.index) != Rest::None {
             let now = self.scheduler.clock.read(&mut self.outside.host);
             end_rest(self, id.index, now);
         }

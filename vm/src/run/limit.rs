@@ -56,7 +56,7 @@ pub(super) fn expire_in_time(vm: &mut Vm, index: TaskIndex, number: LimitNumber,
     match ends {
         Some(ends) if standstill.time_at(now) < ends => {
             // The timer of one whose clock is stopped is set when it goes on.
-            if standstill.stopped.is_none() {
+            if !standstill.is_stopped() {
                 let time = standstill.when(ends);
                 vm.scheduler.timers.push(time, index, Due::Limit(number));
             }
@@ -71,7 +71,7 @@ pub(crate) fn stand_still(vm: &mut Vm, stops_clock: bool) {
     let index = vm.scheduler.turn.index;
     vm.scheduler.task_mut().flags.set_suspended(true);
     if stops_clock {
-        vm.scheduler.tasks.standstill_mut(&mut vm.heap, index).stopped.get_or_insert(now);
+        vm.scheduler.tasks.standstill_mut(&mut vm.heap, index).stop_clock(now);
     }
 }
 
@@ -83,7 +83,7 @@ pub(crate) fn go_on(vm: &mut Vm) {
     task.flags.set_suspended(false);
     task.flags.set_attention(true);
     vm.exchange.charges.end_slice();
-    if vm.scheduler.standstill().stopped.is_none() {
+    if !vm.scheduler.standstill().is_stopped() {
         return;
     }
     let standstill = vm.scheduler.tasks.standstill_mut(&mut vm.heap, index);

@@ -7,7 +7,7 @@
 
 use super::wake::make_runnable;
 use crate::report::{self, Happening};
-use crate::task::{Task, TaskIndex, TaskState};
+use crate::task::{Rest, Task, TaskIndex, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::link;
@@ -16,22 +16,34 @@ use crate::wait::link;
 const PROCEDURES: usize = 100;
 
 /// Returns whether a task can stand still where it is, with nothing to do for it: it waits without an end, in
-/// no cleanup, no form has a limit, and neither procedures nor operations are to be told.
-pub(crate) fn can_rest(vm: &Vm, task: &Task) -> bool {
-    if task.flags.rests() {
-        return true;
-    }
+/// no cleanup, no form has a limit, and neither procedures nor operations are to be told. One at rest can.
+#[inline]
+pub(crate) fn can_rest(vm: &Vm, index: TaskIndex) -> bool {
+    vm.scheduler.tasks.rest(index) != Rest::None
+        || vm.scheduler.tasks.at(index).is_some_and(|task| has_nothing_to_do(vm, task))
+}
+
+#[inline]
+fn has_nothing_to_do(vm: &Vm, task: &Task) -> bool {
     let flags = task.flags;
     let waits = task.state == TaskState::Waiting && task.wait.is_true() && task.critical == 0;
     waits
         && !(flags.attention() || flags.abort_pending() || flags.suspended())
-        && link::deadline(&vm.heap, task.wait).is_none()
+        && !has_deadline(vm, task)
         && task.extra.as_ref().is_none_or(|extra| {
             extra.limits.is_empty() && extra.interrupts.is_empty() && extra.fund.is_none()
         })
-        && task.control.get().is_none_or(|control| control.running.is_empty() && control.unwinding.is_none())
-        && !has_procedures(vm, task)
+        && task.control.get().is_none_or(|control| {
+            control.running.is_empty() && control.unwinding.is_none() && !has_procedures(vm, task)
+        })
         && !vm.outside.operations.has_begun_one(task.number)
+}
+
+/// Returns whether the wait at which a task is parked ends by itself.
+#[inline]
+fn has_deadline(vm: &Vm, task: &Task) -> bool {
+    debug_assert_eq!(task.has_deadline, link::deadline(&vm.heap, task.wait).is_some());
+    task.has_deadline
 }
 
 /// Returns whether a task is in a form with procedures for its suspension, as far as it takes to know.
@@ -55,16 +67,15 @@ pub(crate) fn begin_rest(vm: &mut Vm, tasks: &[TaskIndex], stops_clock: bool, no
     let by = vm.scheduler.task().object;
     vm.scheduler.tasks.make_standstills(&mut vm.heap);
     for &index in tasks {
-        let Some((task, standstill)) = vm.scheduler.tasks.with_standstill(index) else { continue };
+        let Some((rest, standstill)) = vm.scheduler.tasks.rest_mut(index) else { continue };
         standstill.times = standstill.times.saturating_add(1);
-        if task.flags.rests() {
+        if *rest != Rest::None {
             continue;
         }
-        task.flags.set_rests(true);
-        task.flags.set_suspended(true);
-        standstill.by = Some(by);
+        *rest = Rest::Rests;
+        standstill.by = by;
         if stops_clock {
-            standstill.stopped = Some(now);
+            standstill.stop_clock(now);
         }
         report::note(vm, index, Happening::Waits);
     }
@@ -73,38 +84,38 @@ pub(crate) fn begin_rest(vm: &mut Vm, tasks: &[TaskIndex], stops_clock: bool, no
 /// Resumes tasks at rest once. Those go on that were suspended no more often.
 pub(crate) fn resume_from_rest(vm: &mut Vm, tasks: &[TaskIndex], now: u64) {
     for &index in tasks {
-        let Some((task, standstill)) = vm.scheduler.tasks.with_standstill(index) else { continue };
-        if task.flags.rests() {
-            standstill.times = standstill.times.saturating_sub(1);
-            if standstill.times == 0 {
-                go_on_from_rest(vm, index, now);
-            }
+        let Some((rest, standstill)) = vm.scheduler.tasks.rest_mut(index) else { continue };
+        if *rest == Rest::None {
+            continue;
+        }
+        standstill.times = standstill.times.saturating_sub(1);
+        if standstill.times == 0 {
+            let was_woken = std::mem::take(rest) == Rest::Woken;
+            let by = standstill.end_rest(now);
+            go_on_from_rest(vm, index, was_woken, by);
         }
     }
 }
 
 /// Has a task at rest stand still no more. Returns how often it was to be resumed; 0 if it was not at rest.
 pub(crate) fn end_rest(vm: &mut Vm, index: TaskIndex, now: u64) -> u32 {
-    let Some((task, standstill)) = vm.scheduler.tasks.with_standstill(index) else { return 0 };
-    if !task.flags.rests() {
+    let Some((rest, standstill)) = vm.scheduler.tasks.rest_mut(index) else { return 0 };
+    if *rest == Rest::None {
         return 0;
     }
     let times = std::mem::take(&mut standstill.times);
-    go_on_from_rest(vm, index, now);
+    let was_woken = std::mem::take(rest) == Rest::Woken;
+    let by = standstill.end_rest(now);
+    go_on_from_rest(vm, index, was_woken, by);
     times
 }
 
-/// Has a task at rest go on: what has come meanwhile reaches it.
+/// Has a task go on whose rest, which `by` has begun, is over: what has come meanwhile reaches it.
 #[inline(always)]
-fn go_on_from_rest(vm: &mut Vm, index: TaskIndex, now: u64) {
-    let Some((task, standstill)) = vm.scheduler.tasks.with_standstill(index) else { return };
-    let (was_woken, is_urgent) = (task.flags.woken(), task.flags.attention());
-    task.flags.set_rests(false);
-    task.flags.set_suspended(false);
-    task.flags.set_woken(false);
-    standstill.start_clock(now);
-    vm.heap.log_if_marking(standstill.by.take().unwrap_or(Value::NIL));
+fn go_on_from_rest(vm: &mut Vm, index: TaskIndex, was_woken: bool, by: Value) {
+    vm.heap.log_if_marking(by);
     if was_woken {
+        let is_urgent = vm.scheduler.tasks.at(index).is_some_and(|task| task.flags.attention());
         make_runnable(vm, index, is_urgent);
     } else {
         report::note(vm, index, Happening::Waits);

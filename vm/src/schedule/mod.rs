@@ -37,7 +37,7 @@ use crate::config::Config;
 use crate::heap::Heap;
 use crate::raise::{Exit, Outcome};
 use crate::task::{
-    AccountId, LimitNumber, Serial, Standstill, Task, TaskId, TaskIndex, TaskNumber, TaskState, Tasks,
+    AccountId, LimitNumber, Rest, Serial, Standstill, Task, TaskId, TaskIndex, TaskNumber, TaskState, Tasks,
 };
 use crate::value::Value;
 use crate::wait::{Deliveries, event, input, link};
@@ -173,6 +173,12 @@ impl Scheduler {
         self.tasks.standstill(self.turn.index)
     }
 
+    /// Returns whether a task is suspended, by an interrupt or at rest.
+    pub(crate) fn is_suspended(&self, heap: &Heap, task: &Task) -> bool {
+        let index = event::task_index(heap, task.object);
+        task.flags.suspended() || index.is_some_and(|index| self.tasks.rest(index) != Rest::None)
+    }
+
     /// Returns the number of the running task, or [`TaskNumber::NONE`].
     pub(crate) fn running_number(&self) -> TaskNumber {
         self.running.as_ref().map_or(TaskNumber::NONE, |task| task.number)
@@ -197,11 +203,7 @@ impl Scheduler {
     /// Puts a task at the end of its queue, or of the urgent one. Returns whether it was parked. One at rest
     /// stays there; that it was to go on is noted.
     pub(crate) fn make_runnable(&mut self, index: TaskIndex, urgent: bool) -> bool {
-        let Some(task) = self.tasks.at_mut(index) else { return false };
-        if task.flags.rests() {
-            task.flags.set_woken(true);
-            return false;
-        }
+        let Some(task) = self.tasks.to_go_on(index) else { return false };
         let serial = self.serial.advance();
         let was_parked = std::mem::replace(&mut task.state, TaskState::Runnable) != TaskState::Runnable;
         task.serial = serial;
@@ -236,7 +238,9 @@ impl Scheduler {
     /// # Errors
     /// Always [`Exit::Park`].
     pub(crate) fn park_at(&mut self, wait: Value, deadline: Option<u64>) -> Outcome {
-        self.task_mut().wait = wait;
+        let task = self.task_mut();
+        task.wait = wait;
+        task.has_deadline = deadline.is_some();
         self.turn.parking = Parking::Wait(deadline);
         Err(Exit::Park)
     }

@@ -23,7 +23,7 @@ pub(crate) use control_stack::{
 pub use id::TaskNumber;
 pub(crate) use id::{LimitNumber, Serial, TaskIndex};
 pub(crate) use limit::{AccountId, Allowance, Fund, Limit};
-pub(crate) use standstill::Standstill;
+pub(crate) use standstill::{Rest, Standstill};
 pub use tasks::TaskId;
 pub(crate) use tasks::Tasks;
 
@@ -51,21 +51,35 @@ pub(crate) enum TaskState {
 }
 
 /// Record of a task. There may be a million of them, so rarely used parts are behind pointers: [`Extra`] and
-/// [`LazyControl`].
+/// [`LazyControl`]. What is looked at in all tasks of a tree comes first, since it then is in one line of the
+/// cache, or two.
 #[derive(Clone)]
+#[repr(C)]
 pub(crate) struct Task {
-    /// Registers of its frames.
-    pub stack: Stack,
-    /// Next instruction, while it does not run.
-    pub pc: SavedPc,
+    /// Object that programs hold.
+    pub object: Value,
+    /// Ordinal, counted from the machine's first task.
+    pub number: TaskNumber,
+    /// Wait at which it is parked, until it goes on; otherwise `NIL`.
+    pub wait: Value,
     /// Control stack and bindings.
     pub control: LazyControl,
     /// Rarely used parts.
     pub extra: Option<Box<Extra>>,
-    /// Object that programs hold.
-    pub object: Value,
-    /// Wait at which it is parked, until it goes on; otherwise `NIL`.
-    pub wait: Value,
+    /// Properties that are true or false.
+    pub flags: Flags,
+    /// Whether it can run.
+    pub state: TaskState,
+    /// Priority from 0 to 7, most urgent last.
+    pub priority: u8,
+    /// Number of critical sections that it is in.
+    pub critical: u8,
+    /// Whether the wait at which it is parked ends by itself at a time.
+    pub has_deadline: bool,
+    /// Registers of its frames.
+    pub stack: Stack,
+    /// Next instruction, while it does not run.
+    pub pc: SavedPc,
     /// Told of its end, beside the waits for it: a cons with the wait of a net, into whose queue it is put
     /// then, so that the end needs no memory; a guard; or `NIL`.
     pub notify: Value,
@@ -73,8 +87,6 @@ pub(crate) struct Task {
     pub ticks: u64,
     /// Serial number of its state, see [`Serial`].
     pub serial: Serial,
-    /// Ordinal, counted from the machine's first task.
-    pub number: TaskNumber,
     /// Cycle of the collector in which the stack was last scanned.
     pub scanned: u64,
     /// Offset of the running frame's base, while it does not run.
@@ -85,14 +97,6 @@ pub(crate) struct Task {
     pub account: AccountId,
     /// Bytes that the heap counts for it, in units of [`UNIT`].
     pub counted: u32,
-    /// Whether it can run.
-    pub state: TaskState,
-    /// Priority from 0 to 7, most urgent last.
-    pub priority: u8,
-    /// Number of critical sections that it is in.
-    pub critical: u8,
-    /// Properties that are true or false.
-    pub flags: Flags,
 }
 
 /// Properties of a task that are true or false.
@@ -144,20 +148,16 @@ define_flags! {
     oversized set_oversized = 7;
     /// It stands at a point, before it does what others can see: see `explore`.
     at_point set_at_point = 8;
-    /// It stands still: of what is pending only its end is delivered.
+    /// It stands still, by an interrupt: of what is pending only its end is delivered.
     suspended set_suspended = 9;
-    /// It is suspended, and stands still where it waits; no wake-up reaches it.
-    rests set_rests = 10;
-    /// It was to go on since it is at rest.
-    woken set_woken = 11;
     /// It uses the memory that is kept for cleanups, since there is no other.
-    uses_cleanup_memory set_uses_cleanup_memory = 12;
+    uses_cleanup_memory set_uses_cleanup_memory = 10;
     /// A cleanup has made it, or a task that works for one.
-    serves_cleanup set_serves_cleanup = 13;
+    serves_cleanup set_serves_cleanup = 11;
     /// Its last turn has ended since there was no room for something, which it does again in the next.
-    lacks_room set_lacks_room = 14;
+    lacks_room set_lacks_room = 12;
     /// Since it came to lack room, everything has been collected.
-    collected_for set_collected_for = 15;
+    collected_for set_collected_for = 13;
 }
 
 /// What is known of the lack of room for which a task's last turn has ended.
@@ -299,25 +299,26 @@ impl Task {
 
     fn with_stack(object: Value, stack: Stack) -> Task {
         Task {
-            stack,
-            pc: SavedPc::NONE,
+            object,
+            number: TaskNumber::NONE,
+            wait: Value::NIL,
             control: LazyControl::default(),
             extra: None,
-            object,
-            wait: Value::NIL,
+            flags: Flags::default(),
+            state: TaskState::Runnable,
+            priority: DEFAULT_PRIORITY,
+            critical: 0,
+            has_deadline: false,
+            stack,
+            pc: SavedPc::NONE,
             notify: Value::NIL,
             ticks: 0,
             serial: Serial::default(),
-            number: TaskNumber::NONE,
             scanned: 0,
             base: 0,
             turns: 0,
             account: AccountId::NONE,
             counted: 0,
-            state: TaskState::Runnable,
-            priority: DEFAULT_PRIORITY,
-            critical: 0,
-            flags: Flags::default(),
         }
     }
 

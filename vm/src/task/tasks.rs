@@ -2,7 +2,7 @@
 
 use esl_heap::list_state;
 
-use super::{Standstill, Task, TaskIndex};
+use super::{Rest, Standstill, Task, TaskIndex};
 use crate::heap::{Heap, Holder};
 use crate::stack::Stack;
 use crate::value::Value;
@@ -29,6 +29,8 @@ struct TaskPlace {
     generation: u32,
     /// Whether a task has the place.
     taken: bool,
+    /// Whether it is at rest.
+    rest: Rest,
 }
 
 /// Table of a machine's tasks. The record of the running task is out of its place.
@@ -48,7 +50,7 @@ pub(crate) struct Tasks {
 }
 
 list_state! { TaskId { index: Run, generation: Run } }
-list_state! { TaskPlace { task: Visited, generation: Run, taken: Run } }
+list_state! { TaskPlace { task: Visited, generation: Run, taken: Run, rest: Run } }
 list_state! { Tasks {
     places: Run,
     standstills: Run,
@@ -164,6 +166,18 @@ impl Tasks {
         self.places.get_mut(index.as_usize())?.task.as_deref_mut()
     }
 
+    /// Returns the task with this index, which is to go on, unless it runs or is at rest. Of one at rest that
+    /// is noted.
+    #[inline(always)]
+    pub(crate) fn to_go_on(&mut self, index: TaskIndex) -> Option<&mut Task> {
+        let place = self.places.get_mut(index.as_usize())?;
+        if place.rest != Rest::None {
+            place.rest = Rest::Woken;
+            return None;
+        }
+        place.task.as_deref_mut()
+    }
+
     /// Takes a task out of its place, to be run.
     #[inline]
     pub(crate) fn take(&mut self, index: TaskIndex) -> Option<Box<Task>> {
@@ -183,6 +197,7 @@ impl Tasks {
             return None;
         }
         place.taken = false;
+        place.rest = Rest::None;
         self.free.push(id.index.0);
         if let Some(standstill) = self.standstills.get_mut(id.index.as_usize()) {
             *standstill = Standstill::NONE;
@@ -202,11 +217,18 @@ impl Tasks {
         &mut self.standstills[index.as_usize()]
     }
 
-    /// Returns the task with this index, unless it runs, and its standstill, if there is one for its place.
+    /// Returns whether the task with this index is at rest.
     #[inline(always)]
-    pub(crate) fn with_standstill(&mut self, index: TaskIndex) -> Option<(&mut Task, &mut Standstill)> {
-        let task = self.places.get_mut(index.as_usize())?.task.as_deref_mut()?;
-        Some((task, self.standstills.get_mut(index.as_usize())?))
+    pub(crate) fn rest(&self, index: TaskIndex) -> Rest {
+        self.places.get(index.as_usize()).map_or(Rest::None, |place| place.rest)
+    }
+
+    /// Returns whether the task with this index is at rest, to be changed, and its standstill, if there is
+    /// one for its place, unless it runs.
+    #[inline(always)]
+    pub(crate) fn rest_mut(&mut self, index: TaskIndex) -> Option<(&mut Rest, &mut Standstill)> {
+        let place = self.places.get_mut(index.as_usize()).filter(|place| place.task.is_some())?;
+        Some((&mut place.rest, self.standstills.get_mut(index.as_usize())?))
     }
 
     /// Makes a standstill for each place, and has the heap count them.
@@ -222,7 +244,7 @@ impl Tasks {
 
     /// Calls `visit` with every value of the standstills.
     pub(crate) fn visit_standstills(&self, visit: &mut dyn FnMut(Value)) {
-        self.standstills.iter().filter_map(|standstill| standstill.by).for_each(visit);
+        self.standstills.iter().map(|standstill| standstill.by).for_each(visit);
     }
 
     /// Returns the number of places; each task that has not ended has one.
@@ -254,7 +276,7 @@ impl Tasks {
     /// standstill holds. `None` at the end.
     pub(crate) fn next_unmet(&mut self) -> Option<(Option<&mut Task>, Value)> {
         self.unmet = self.unmet.checked_sub(1)?;
-        let held = self.standstill(TaskIndex(self.unmet as u32)).by.unwrap_or(Value::NIL);
+        let held = self.standstill(TaskIndex(self.unmet as u32)).by;
         Some((self.places[self.unmet].task.as_deref_mut(), held))
     }
 
@@ -267,6 +289,7 @@ impl Tasks {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trust::heap_for_tests;
 
     fn task() -> Box<Task> {
         Box::new(Task::new(Value::NIL, 1))
@@ -281,6 +304,19 @@ mod tests {
         assert_eq!(first.index, second.index);
         assert!(!tasks.contains(first) && tasks.get(first).is_none() && tasks.remove(first).is_none());
         assert_eq!(tasks.id_at(first.index), Some(second));
+    }
+
+    #[test]
+    fn that_a_task_at_rest_was_to_go_on_is_noted_until_it_ends() {
+        let (mut tasks, mut heap) = (Tasks::default(), heap_for_tests());
+        let id = tasks.insert(task());
+        assert!(tasks.to_go_on(id.index).is_some() && tasks.rest_mut(id.index).is_none());
+        tasks.make_standstills(&mut heap);
+        *tasks.rest_mut(id.index).unwrap().0 = Rest::Rests;
+        assert!(tasks.to_go_on(id.index).is_none());
+        assert_eq!(tasks.rest(id.index), Rest::Woken);
+        tasks.remove(id);
+        assert_eq!(tasks.rest(tasks.insert(task()).index), Rest::None);
     }
 
     #[test]

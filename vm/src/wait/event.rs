@@ -74,5 +74,6 @@ pub(crate) fn is_awaited(heap: &Heap, event: Value) -> bool {
 /// Returns the place of the task that `object` stands for, while it lives.
 #[inline]
 pub(crate) fn task_index(heap: &Heap, object: Value) -> Option<TaskIndex> {
-    heap.slot_or_nil(object, STATE).as_index().map(|index| TaskIndex(index as u32))
+    let slots = heap.slots::<TASK_LENGTH>(object, Kind::Task)?;
+    slots[STATE].as_index().map(|index| TaskIndex(index as u32))
 }

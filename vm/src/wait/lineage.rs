@@ -72,6 +72,7 @@ fn skip_ended(heap: &mut Heap, node: Value) {
 }
 
 /// Returns the place of the task that a living task belongs to, if it belongs to one.
+#[inline]
 pub(crate) fn owner_of(heap: &Heap, task: Value) -> Option<TaskIndex> {
     let (own, mut node) = place_of(heap, task);
     while let Some(pair) = heap.as_cons(node) {
