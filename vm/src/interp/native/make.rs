@@ -33,8 +33,8 @@ pub(in crate::interp) unsafe fn make_at_entry(vm: &mut Vm, base: *mut Value) {
     }
 }
 
-/// Makes machine code of a code and installs it, or has it made; unless there is some, or too much
-/// altogether.
+/// Makes machine code of a code and installs it, or has it made; unless there is some, or that is being made,
+/// or there is too much altogether.
 ///
 /// # Safety
 /// `code` points to a Code of bytecode.
@@ -49,8 +49,12 @@ pub(super) unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known
         if (is_made && !guesses.is_empty()) || instructions(code).len() > MAX_WORDS {
             return;
         }
+        let has_guesses = !guesses.is_empty();
+        let word = Value::from_object(code.cast()).bits();
+        if compiled.asked.values().any(|&asked| asked == (word, has_guesses)) {
+            return;
+        }
         let source = source_of(code, guesses);
-        let has_guesses = !source.guesses.is_empty();
         if compiled.tier == Tier::Native {
             let maker = match &mut compiled.maker {
                 Some(maker) => Ok(maker),
@@ -71,7 +75,6 @@ pub(super) unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known
         match helper {
             Ok(helper) => {
                 compiled.orders += 1;
-                let word = Value::from_object(code.cast()).bits();
                 compiled.asked.insert(compiled.orders, (word, has_guesses));
                 helper.ask(compiled.orders, source);
             }
