@@ -290,6 +290,7 @@ unsafe fn make_words(context: &mut NativeContext, base: *mut Value) {
 }
 
 /// Counts a call at which machine code was left, and makes machine code of the callee if there were many.
+/// What the arguments are now is the guess of what they will be.
 ///
 /// # Safety
 /// `pc` is the address of an instruction of the frame `base`.
@@ -318,7 +319,11 @@ unsafe fn note_call(vm: &mut Vm, pc: u64, base: u64) {
         let heat = vm.compiled.heat.entry(code.addr() as u64).or_insert(0);
         *heat += 1;
         if *heat == HOT_CALLS {
-            make(vm, code, vec![Known::Nothing]);
+            let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), word.b());
+            let mut guesses: Vec<_> = arguments.iter().map(|&value| Known::of(value)).collect();
+            // Some, even if it is of nothing: doubles are told from other values.
+            guesses.push(Known::Nothing);
+            make(vm, code, guesses);
         }
     }
 }
