@@ -1,6 +1,7 @@
 //! What machine code is given, and how it is left.
 
 use std::ffi::c_void;
+use std::mem::MaybeUninit;
 
 /// The function has returned; the value is in the reply. Its frame is still the topmost one.
 pub const RETURNED: u64 = 0;
@@ -26,6 +27,10 @@ pub const STEP_JUMP: u64 = 1;
 pub const STEP_SIGNAL: u64 = 2;
 /// What a helper says of a builtin called in place of the function: its values are in the value list.
 pub const STEP_VALUES: u64 = 3;
+
+/// What is put aside of a register whose place is as it should be: no result of an operation, and no double
+/// that a program has.
+pub const IN_PLACE: u64 = 0x7FF8_1E57_1E57_1E57;
 
 /// Function of the machine that does the instruction at `pc` in the frame `base`.
 pub type NativeHelper = unsafe extern "C" fn(*mut NativeContext, *const u32, *mut u64) -> u64;
@@ -64,9 +69,10 @@ pub struct NativeContext {
     pub base: u64,
     /// Value that a builtin called in place of the function has returned.
     pub value: u64,
-    /// Registers of the frame in whose places there are bits of doubles, not words: see N3. None while
-    /// machine code runs.
-    pub raw_doubles: [u64; 4],
+    /// Registers of the frame whose doubles are put aside: see N3. None while machine code runs.
+    pub put_aside: [u64; 4],
+    /// The bits of each of them, or [`IN_PLACE`].
+    pub doubles: [MaybeUninit<u64>; 256],
     /// The machine.
     pub machine: *mut c_void,
     /// Does an instruction whose fast way does not apply.

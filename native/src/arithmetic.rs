@@ -5,6 +5,7 @@ use cranelift_codegen::ir::{Block, InstBuilder, Value as Ssa, types};
 use esl_bytecode::opcode::Instr;
 use esl_heap::Value;
 
+use crate::doubles::TAG_DOUBLE;
 use crate::flow::FlowStep;
 use crate::kinds::Known;
 use crate::translate::Translator;
@@ -83,9 +84,8 @@ impl Translator<'_, '_> {
         if x.1 != Known::Fixnum && y.1 != Known::Fixnum {
             let (doubles, mixed) = (self.block(), self.block());
             let both = self.b.ins().band(x.0, y.0);
-            let tag = self.b.ins().band_imm_s(both, 3);
-            let is_double = self.equals(tag, 3);
-            self.branch(is_double, doubles, mixed);
+            let difference = self.differs_from_tag(both, TAG_DOUBLE, TAG_DOUBLE);
+            self.branch(difference, mixed, doubles);
             self.go_to(doubles);
             let (p, q) = (self.decode(x.0), self.decode(y.0));
             self.on_doubles(operation, p, q, slow, done.0);
@@ -151,10 +151,11 @@ impl Translator<'_, '_> {
             return self.set_double(dst, sum);
         }
         self.close_batch();
-        let (x, y) = (self.operand(left), self.fixnum(addend));
+        let x = self.operand(left);
         if x.1 == Known::Fixnum {
             let exit = self.exit();
-            let sum = self.on_fixnums(Arithmetic::Add, x.0, y.0, exit);
+            let (sum, overflow) = self.add_constant(x.0, addend);
+            self.refuse(overflow, exit);
             return self.set(dst, sum, Known::Fixnum);
         }
         let (slow, done) = (self.cold_block(), self.block_with_value());
@@ -162,7 +163,8 @@ impl Translator<'_, '_> {
         let tag = self.b.ins().band_imm_s(x.0, 3);
         self.branch(tag, others, fixnums);
         self.go_to(fixnums);
-        let sum = self.on_fixnums(Arithmetic::Add, x.0, y.0, slow);
+        let (sum, overflow) = self.add_constant(x.0, addend);
+        self.refuse(overflow, slow);
         self.jump_with(done.0, sum);
         self.go_to(others);
         self.require_double(x.0, slow);
@@ -187,9 +189,8 @@ impl Translator<'_, '_> {
 
     /// Goes on only if the word is that of a double, or the words whose common bits these are.
     fn require_double(&mut self, word: Ssa, otherwise: Block) {
-        let tag = self.b.ins().band_imm_s(word, 3);
-        let is_double = self.equals(tag, 3);
-        self.require(is_double, otherwise);
+        let difference = self.differs_from_tag(word, TAG_DOUBLE, TAG_DOUBLE);
+        self.refuse(difference, otherwise);
     }
 
     fn operate(&mut self, operation: Arithmetic, p: Ssa, q: Ssa) -> Ssa {
@@ -396,24 +397,41 @@ impl Translator<'_, '_> {
         Some(self.b.ins().fcmp(order.of_doubles(), p, q))
     }
 
-    /// A jump that depends on the order of two registers.
+    /// A jump that depends on the order of two registers; as a loop instruction it takes a tick.
     pub(crate) fn jump_order(&mut self, order: NumberOrder, left: u8, right: u8, step: &FlowStep) {
         let (x, y) = (self.operand(left), self.operand(right));
-        let (target, next, slow) = (self.target(step), self.block(), self.cold_block());
+        let (target, next) = (self.target(step), self.block());
         let jumps_when = step.instr.opcode().jumps_when();
         let (holds, fails) = if jumps_when { (target, next) } else { (next, target) };
+        // That both are fixnums, or both are doubles, is a guess where such are made: a call in a loop costs
+        // the registers of the processor.
+        let is_guess = self.kinds.tells_doubles() && x.1 != Known::Double && y.1 != Known::Double;
+        let slow = if is_guess { self.wrong() } else { self.cold_block() };
+        // Nothing takes a tick before a way on which the machine code is left.
+        let is_loop = step.instr.opcode().is_loop();
+        if is_loop && !is_guess {
+            self.tick();
+        }
         if let Some(test) = self.order_with_double(order, left, right, slow) {
             self.branch(test, holds, fails);
         } else {
             let (test, others) = self.order_of_fixnums(order, x, y);
+            if is_loop && is_guess {
+                self.tick();
+            }
             self.branch(test, holds, fails);
             self.go_to(others);
             if let Some(test) = self.order_of_doubles(order, x, y, slow) {
+                if is_loop && is_guess {
+                    self.tick();
+                }
                 self.branch(test, holds, fails);
             }
         }
-        self.go_to(slow);
-        self.step_test(target, next);
+        if !is_guess {
+            self.go_to(slow);
+            self.step_test(target, next);
+        }
         self.go_to(next);
     }
 

@@ -97,14 +97,13 @@ impl Translator<'_, '_> {
             self.put_back();
         }
         let (x, y) = (self.operand(counter), self.operand(limit));
-        let addend = self.constant_value(Value::small(by));
         if x.1 == Known::Fixnum {
             // The counter stays a fixnum: what would make it something else leaves the machine code.
             let exit = self.exit();
             if let Some(test) = self.not_fixnums(x, y) {
                 self.refuse(test, exit);
             }
-            let (sum, overflow) = self.b.ins().sadd_overflow(x.0, addend);
+            let (sum, overflow) = self.add_constant(x.0, by);
             self.refuse(overflow, exit);
             self.tick();
             self.set(counter, sum, Known::Fixnum);
@@ -117,7 +116,7 @@ impl Translator<'_, '_> {
         if let Some(test) = self.not_fixnums(x, y) {
             self.refuse(test, slow);
         }
-        let (sum, overflow) = self.b.ins().sadd_overflow(x.0, addend);
+        let (sum, overflow) = self.add_constant(x.0, by);
         self.refuse(overflow, slow);
         let (jump, fall) = (self.block_with_value(), self.block_with_value());
         let is_less = self.b.ins().icmp(IntCC::SignedLessThan, sum, y.0);

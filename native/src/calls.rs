@@ -11,6 +11,7 @@ use esl_heap::heap::layout::{CodeObject, FunctionObject, SymbolObject};
 use crate::abi::{EntryStub, NativeContext, RETURN_VALUES, RETURNED, STEP_SIGNAL, TAIL};
 use crate::emit::{WORD, in_object, memory};
 use crate::kinds::Known;
+use crate::places::RegisterBits;
 use crate::translate::Translator;
 
 /// Where the link of a frame has its function, from the frame's base on.
@@ -29,9 +30,9 @@ impl Translator<'_, '_> {
         let (context, exit) = (self.context, self.exit());
         let offset = offset_of!(NativeContext, ticks) as i32;
         let ticks = self.b.ins().load(types::I32, memory(), context, offset);
-        let left = self.b.ins().iadd_imm_s(ticks, -1);
-        let is_spent = self.b.ins().icmp_imm_s(IntCC::SignedLessThan, left, 0);
+        let is_spent = self.b.ins().icmp_imm_s(IntCC::SignedLessThanOrEqual, ticks, 0);
         self.refuse(is_spent, exit);
+        let left = self.b.ins().iadd_imm_s(ticks, -1);
         self.b.ins().store(memory(), left, context, offset);
     }
 
@@ -78,7 +79,7 @@ impl Translator<'_, '_> {
         if want != Want::ONE {
             return self.leave();
         }
-        self.put_back();
+        self.put_back_for_call(window);
         let function = self.global(symbol);
         let callee = self.callee(function, count);
         self.call(window, callee, None, next);
@@ -88,7 +89,7 @@ impl Translator<'_, '_> {
         if want != Want::ONE {
             return self.leave();
         }
-        self.put_back();
+        self.put_back_for_call(window);
         let (function, exit) = (self.get(window), self.exit());
         self.require_kind(function, Kind::Function, exit);
         let callee = self.callee(function, count);
@@ -99,7 +100,7 @@ impl Translator<'_, '_> {
         if want != Want::ONE {
             return self.leave();
         }
-        self.put_back();
+        self.put_back_for_call(window);
         let function = self.running();
         let (itself, pointer) = (self.itself, self.pointer);
         let address = self.b.ins().func_addr(pointer, itself);
@@ -117,6 +118,7 @@ impl Translator<'_, '_> {
         self.store(callee.function, base, place);
         let return_to = self.pc(next);
         self.store(return_to, base, place + WORD);
+        self.kept_back = RegisterBits::NONE;
         let first = self.word(0);
         let (again, address) = self.block_with_value();
         let (done, value) = self.block_with_value();

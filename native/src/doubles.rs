@@ -2,7 +2,8 @@
 //!
 //! The result of an operation has to be a double without a box, else the interpreter does the operation. The
 //! results of several operations in a row, none of which does anything else, are tested together: a *batch*.
-//! If one of them needs a box, the machine code is left at the first of them, with the registers as they were
+//! Loads that give doubles, and small constants, may stand among them. If a result needs a box, or a load
+//! gives something else, the machine code is left at the first operation, with the registers as they were
 //! there.
 
 use std::mem::offset_of;
@@ -11,30 +12,35 @@ use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::{Block, Endianness, InstBuilder, MemFlagsData, Value as Ssa, types};
 use esl_heap::Value;
 
-use crate::abi::{GUESSED_WRONG, NativeContext};
+use crate::abi::{GUESSED_WRONG, IN_PLACE, NativeContext};
 use crate::emit::WORD;
 use crate::kinds::Known;
 use crate::places::RegisterBits;
 use crate::translate::Translator;
 
-/// What is in the register of the processor if the place in the stack is as it should be: no result of an
-/// operation, and no double that a program has.
-const IN_PLACE: u64 = 0x7FF8_1E57_1E57_1E57;
+/// The two lowest bits of the word of a double that needs no box and is no zero.
+pub(crate) const TAG_DOUBLE: u64 = 3;
+
+/// Makes bits 61 and 62 of such doubles zero, where their bias makes them ones.
+const TESTING_BIAS: u64 = Value::DOUBLE_BIAS + (1 << 61);
 
 /// Results that are tested together.
 #[derive(Debug)]
 pub(crate) struct DoubleBatch {
     /// Word of the first operation.
     at: usize,
-    /// RegisterBits that were kept back there: doubles, and such as may be.
-    doubles: RegisterBits,
-    spent: RegisterBits,
+    /// RegisterBits that were kept back there.
+    kept_back: RegisterBits,
     /// What has been overwritten since of those.
     saved: Vec<(usize, Ssa)>,
     /// The results, and whether they may be zeros.
     results: Vec<(Ssa, bool)>,
-    /// The bits that all words of results have, in the first half of a vector.
+    /// The bits that any of the results has with [`TESTING_BIAS`], in both halves of a vector.
     common: Option<Ssa>,
+    /// Words that get to their places when the results have been tested.
+    unwritten: Vec<(u8, Ssa)>,
+    /// Blocks that leave at the first operation, with their statuses.
+    ways_out: Vec<(u64, Block)>,
 }
 
 /// What has to be done where control goes to another instruction.
@@ -53,46 +59,80 @@ impl Translator<'_, '_> {
 
     /// Adds a result to the batch. The operation must have no other effect than that a register gets it.
     pub(crate) fn test_later(&mut self, double: Ssa, may_be_zero: bool) {
-        let vector = self.b.ins().scalar_to_vector(types::F64X2, double);
+        let vector = self.b.ins().splat(types::F64X2, double);
         let vector = self.b.ins().bitcast(types::I64X2, little_endian(), vector);
         let mut bias = [0; 16];
-        bias[..8].copy_from_slice(&Value::DOUBLE_BIAS.to_le_bytes());
+        bias[..8].copy_from_slice(&TESTING_BIAS.to_le_bytes());
         let bias = self.b.func.dfg.constants.insert(bias.as_slice().into());
         let bias = self.b.ins().vconst(types::I64X2, bias);
         let biased = self.b.ins().iadd(vector, bias);
-        let (doubles, spent) = self.kept_back();
+        let kept_back = self.kept_back;
         let batch = self.batch.get_or_insert(DoubleBatch {
             at: self.at,
-            doubles,
-            spent,
+            kept_back,
             saved: Vec::new(),
             results: Vec::new(),
             common: None,
+            unwritten: Vec::new(),
+            ways_out: Vec::new(),
         });
         batch.results.push((double, may_be_zero));
         batch.common = Some(match batch.common {
-            Some(common) => self.b.ins().band(common, biased),
+            Some(common) => self.b.ins().bor(common, biased),
             None => biased,
         });
     }
 
     /// Tests the results of the batch, if there is one.
     pub(crate) fn close_batch(&mut self) {
-        let Some(batch) = self.batch.take() else { return };
+        self.close_batch_for(None);
+    }
+
+    /// As [`Translator::close_batch`], before an instruction that needs the word of a double: where it is a
+    /// result of the batch, the test of the batch is that of its word.
+    pub(crate) fn close_batch_for(&mut self, wanted: Option<u8>) {
+        let Some(mut batch) = self.batch.take() else { return };
         let Some(common) = batch.common else { return };
-        let (next, again, out) = (self.block(), self.cold_block(), self.cold_block());
+        let wanted = wanted
+            .filter(|&register| self.known[usize::from(register)] == Known::Double)
+            .map(|register| (usize::from(register), self.get_double(register)))
+            .filter(|&(register, double)| {
+                self.words[register].is_none() && batch.results.iter().any(|&(result, _)| result == double)
+            });
+        let (next, again) = (self.block(), self.cold_block());
         let common = self.b.ins().bitcast(types::F64X2, little_endian(), common);
         let common = self.b.ins().extractlane(common, 0);
         let common = self.bits_of(common);
-        let are_words = self.is_biased_word(common);
-        self.branch(are_words, next, again);
+        match wanted {
+            Some((register, double)) => {
+                let word = self.b.append_block_param(next, types::I64);
+                let rotated = match batch.results.as_slice() {
+                    // The other bias has made the bits of the tag zero, and turned the sign above them.
+                    [_] => {
+                        let rotated = self.b.ins().rotl_imm_s(common, 3);
+                        self.b.ins().bxor_imm_s(rotated, 7)
+                    }
+                    _ => {
+                        let bits = self.bits_of(double);
+                        self.rotated(bits)
+                    }
+                };
+                let fails = self.is_no_word(common);
+                self.b.ins().brif(fails, again, &[], next, &[rotated.into()]);
+                self.words[register] = Some(word);
+            }
+            None => {
+                let fails = self.is_no_word(common);
+                self.branch(fails, again, next);
+            }
+        }
 
         self.go_to(again);
         let mut all = None;
         for &(double, may_be_zero) in &batch.results {
             let bits = self.bits_of(double);
-            let biased = self.biased(bits);
-            let mut test = self.is_biased_word(biased);
+            let rotated = self.rotated(bits);
+            let mut test = self.is_word(rotated);
             if may_be_zero {
                 let zero = self.b.ins().f64const(0.0);
                 let is_zero = self.b.ins().fcmp(FloatCC::Equal, double, zero);
@@ -103,34 +143,84 @@ impl Translator<'_, '_> {
                 None => test,
             });
         }
-        match all {
-            Some(all) => self.branch(all, next, out),
+        if let Some(all) = all {
+            let out = self.way_out_of(&mut batch, GUESSED_WRONG);
+            self.require(all, out);
+        }
+        match wanted {
+            Some((_, double)) => {
+                let word = self.encode(double);
+                self.jump_with(next, word);
+            }
             None => self.jump(next),
         }
 
-        self.go_to(out);
-        for register in batch.doubles.iter().chain(batch.spent.iter()) {
+        for (status, out) in std::mem::take(&mut batch.ways_out) {
+            self.go_to(out);
+            self.leave_batch(&batch, status);
+        }
+        self.go_to(next);
+        let base = self.base;
+        for (register, word) in batch.unwritten {
+            self.store(word, base, i32::from(register) * WORD);
+        }
+    }
+
+    /// Leaves at the first operation of a batch, with the registers as they were there.
+    fn leave_batch(&mut self, batch: &DoubleBatch, status: u64) {
+        for register in batch.kept_back.iter() {
             let saved = batch.saved.iter().find(|(saved, _)| *saved == register);
             let double = match saved {
                 Some(&(_, double)) => double,
                 None => self.get_double(register as u8),
             };
-            if batch.spent.contains(register) {
-                self.write_spent(register, double);
-            } else {
-                self.write_raw(register, double);
-            }
+            self.put_aside(register, double);
         }
-        self.name_raw(batch.doubles);
-        self.leave_at(batch.at, GUESSED_WRONG);
-        self.go_to(next);
+        self.name_put_aside(batch.kept_back);
+        self.leave_at(batch.at, status);
+    }
+
+    fn way_out_of(&mut self, batch: &mut DoubleBatch, status: u64) -> Block {
+        if let Some(&(_, block)) = batch.ways_out.iter().find(|&&(of, _)| of == status) {
+            return block;
+        }
+        let block = self.cold_block();
+        batch.ways_out.push((status, block));
+        block
+    }
+
+    /// Returns the block that leaves at the instruction that is translated, or at the first one of the batch.
+    /// Both read only.
+    pub(crate) fn exit_of_batch(&mut self, status: u64) -> Block {
+        let Some(mut batch) = self.batch.take() else { return self.way_out(self.at, status) };
+        let block = self.way_out_of(&mut batch, status);
+        self.batch = Some(batch);
+        block
+    }
+
+    /// Writes a register, with the batch if there is one: then its place is written when that is tested.
+    pub(crate) fn set_with_batch(&mut self, register: u8, value: Ssa, known: Known) {
+        if self.batch.is_none() {
+            return self.set(register, value, known);
+        }
+        debug_assert!(known != Known::Double && self.guess != Some(register), "{register} at {}", self.at);
+        self.save_for_batch(usize::from(register));
+        self.note(register, value, known);
+        self.write_with_batch(register, Some(value));
+    }
+
+    /// Has the place of a register written when the batch is tested, or no more.
+    pub(crate) fn write_with_batch(&mut self, register: u8, word: Option<Ssa>) {
+        if let Some(batch) = &mut self.batch {
+            batch.unwritten.retain(|&(unwritten, _)| unwritten != register);
+            batch.unwritten.extend(word.map(|word| (register, word)));
+        }
     }
 
     /// Notes what a register holds that is about to be overwritten, if the batch may have to put it back.
     pub(crate) fn save_for_batch(&mut self, register: usize) {
         let is_needed = self.batch.as_ref().is_some_and(|batch| {
-            (batch.doubles.contains(register) || batch.spent.contains(register))
-                && batch.saved.iter().all(|(saved, _)| *saved != register)
+            batch.kept_back.contains(register) && batch.saved.iter().all(|(saved, _)| *saved != register)
         });
         if is_needed {
             let double = self.get_double(register as u8);
@@ -151,27 +241,30 @@ impl Translator<'_, '_> {
         self.b.ins().iadd(bits, bias)
     }
 
-    /// Returns whether the rotation of biased bits gives the word of a double.
-    fn is_biased_word(&mut self, biased: Ssa) -> Ssa {
-        let top = self.b.ins().ushr_imm_s(biased, 61);
-        let tag = self.b.ins().band_imm_s(top, 3);
-        self.equals(tag, 3)
+    /// Zero if these bits, with [`TESTING_BIAS`], are those of a double that is a word, or of several.
+    fn is_no_word(&mut self, bits: Ssa) -> Ssa {
+        let top = self.b.ins().ushr_imm_s(bits, 61);
+        self.b.ins().band_imm_s(top, TAG_DOUBLE as i64)
     }
 
     /// Returns the word of a double that was tested.
     fn encode(&mut self, double: Ssa) -> Ssa {
         let bits = self.bits_of(double);
-        let (word, is_word) = self.rotated(bits);
+        let word = self.rotated(bits);
+        let is_word = self.is_word(word);
         let zero = self.zero_of(bits);
         self.b.ins().select(is_word, word, zero)
     }
 
-    /// Returns what the word of a double is, unless it is a zero, and whether it is none.
-    fn rotated(&mut self, bits: Ssa) -> (Ssa, Ssa) {
+    /// Returns what the word of a double is, unless it is a zero.
+    fn rotated(&mut self, bits: Ssa) -> Ssa {
         let biased = self.biased(bits);
-        let word = self.b.ins().rotl_imm_s(biased, 3);
-        let tag = self.b.ins().band_imm_s(word, 3);
-        (word, self.equals(tag, 3))
+        self.b.ins().rotl_imm_s(biased, 3)
+    }
+
+    fn is_word(&mut self, rotated: Ssa) -> Ssa {
+        let difference = self.differs_from_tag(rotated, TAG_DOUBLE, TAG_DOUBLE);
+        self.equals(difference, 0)
     }
 
     fn zero_of(&mut self, bits: Ssa) -> Ssa {
@@ -199,8 +292,9 @@ impl Translator<'_, '_> {
         let (done, word) = self.block_with_value();
         let zeros = self.cold_block();
         let bits = self.bits_of(double);
-        let (rotated, is_word) = self.rotated(bits);
-        self.b.ins().brif(is_word, done, &[rotated.into()], zeros, &[]);
+        let rotated = self.rotated(bits);
+        let difference = self.differs_from_tag(rotated, TAG_DOUBLE, TAG_DOUBLE);
+        self.b.ins().brif(difference, zeros, &[], done, &[rotated.into()]);
         self.go_to(zeros);
         let zero = self.zero_of(bits);
         self.jump_with(done, zero);
@@ -220,15 +314,12 @@ impl Translator<'_, '_> {
     /// Goes to `done` with the double that a word is, unless it is none or has a constant of its own: then
     /// to `others`, where the code goes on. Returns the tag of the word.
     pub(crate) fn decode_or(&mut self, word: Ssa, done: Block, others: Block) -> Ssa {
-        let doubles = self.block();
-        let tag = self.b.ins().band_imm_s(word, 3);
-        let is_double = self.equals(tag, 3);
-        self.branch(is_double, doubles, others);
-        self.go_to(doubles);
+        let difference = self.differs_from_tag(word, TAG_DOUBLE, TAG_DOUBLE);
+        self.refuse(difference, others);
         let double = self.decode(word);
         self.jump_with(done, double);
         self.go_to(others);
-        tag
+        self.b.ins().band_imm_s(word, TAG_DOUBLE as i64)
     }
 
     /// Jumps to `done` with the zero that a word is, or to `otherwise`.
@@ -266,30 +357,31 @@ impl Translator<'_, '_> {
         (doubles, spent)
     }
 
-    /// Writes what is kept back to the stack, on the way that control takes here only. The machine makes
-    /// words of the doubles.
-    pub(crate) fn write_back(&mut self, doubles: RegisterBits, spent: RegisterBits) {
-        for register in doubles.iter() {
+    /// Puts aside what is kept back, on the way that control takes here only. The machine writes it.
+    pub(crate) fn put_all_aside(&mut self, kept_back: RegisterBits) {
+        for register in kept_back.iter() {
             let double = self.get_double(register as u8);
-            self.write_raw(register, double);
+            self.put_aside(register, double);
         }
+        self.name_put_aside(kept_back);
+    }
+
+    fn put_aside(&mut self, register: usize, double: Ssa) {
+        self.store_context(double, offset_of!(NativeContext, doubles) + register * size_of::<u64>());
+    }
+
+    /// Tells the machine what has been put aside.
+    fn name_put_aside(&mut self, kept_back: RegisterBits) {
+        for (index, word) in kept_back.words().into_iter().enumerate().filter(|&(_, word)| word != 0) {
+            let word = self.word(word);
+            self.store_context(word, offset_of!(NativeContext, put_aside) + index * size_of::<u64>());
+        }
+    }
+
+    fn write_all_spent(&mut self, spent: RegisterBits) {
         for register in spent.iter() {
             let double = self.get_double(register as u8);
             self.write_spent(register, double);
-        }
-        self.name_raw(doubles);
-    }
-
-    fn write_raw(&mut self, register: usize, double: Ssa) {
-        let base = self.base;
-        self.store(double, base, register as i32 * WORD);
-    }
-
-    /// Tells the machine of which places it has to make words.
-    fn name_raw(&mut self, doubles: RegisterBits) {
-        for (index, word) in doubles.words().into_iter().enumerate().filter(|&(_, word)| word != 0) {
-            let word = self.word(word);
-            self.store_context(word, offset_of!(NativeContext, raw_doubles) + index * size_of::<u64>());
         }
     }
 
@@ -305,15 +397,28 @@ impl Translator<'_, '_> {
 
     /// Puts back all that is kept back: what comes next looks at the stack.
     pub(crate) fn put_back(&mut self) {
+        self.put_back_but(RegisterBits::NONE);
+    }
+
+    /// Puts back what is kept back, but for the places of the link that a call is going to write.
+    pub(crate) fn put_back_for_call(&mut self, window: u8) {
+        let mut link = RegisterBits::NONE;
+        link.insert_range(usize::from(window), 2);
+        self.put_back_but(link);
+    }
+
+    fn put_back_but(&mut self, others: RegisterBits) {
         self.close_batch();
+        let kept_back = self.kept_back;
+        self.kept_back = kept_back.without(others);
         let (doubles, spent) = self.kept_back();
         for register in doubles.iter() {
             self.make_word(register);
             let (word, base) = (self.word_of_double(register), self.base);
             self.store(word, base, register as i32 * WORD);
         }
-        self.write_back(RegisterBits::NONE, spent);
-        self.kept_back = RegisterBits::NONE;
+        self.write_all_spent(spent);
+        self.kept_back = kept_back.without(self.kept_back);
     }
 
     /// Writes words that hold no address where doubles are kept back that nobody will read.
@@ -323,7 +428,7 @@ impl Translator<'_, '_> {
         for register in doubles.iter() {
             self.store(zero, base, register as i32 * WORD);
         }
-        self.write_back(RegisterBits::NONE, spent);
+        self.write_all_spent(spent);
     }
 
     // Ways from one instruction to another.

@@ -20,6 +20,10 @@ pub(crate) const WORD: i32 = size_of::<Value>() as i32;
 /// Offset of the first element behind a header.
 pub(crate) const ELEMENTS: i32 = size_of::<Header>() as i32;
 
+/// The bits in which the tags of the words that have addresses are the same, and no other tag.
+const ADDRESS_MASK: u64 = 3;
+const _: () = assert!(TAG_CONS & ADDRESS_MASK == TAG_OBJECT & ADDRESS_MASK);
+
 /// From the value of an object to the byte `offset` of it.
 pub(crate) const fn in_object(offset: usize) -> i32 {
     offset as i32 - TAG_OBJECT as i32
@@ -113,8 +117,15 @@ impl Translator<'_, '_> {
         self.kept_back.insert(usize::from(register));
     }
 
+    /// As [`Translator::set_double`], for a double of which the word is at hand.
+    pub(crate) fn set_double_of(&mut self, register: u8, double: Ssa, word: Ssa) {
+        self.set_double(register, double);
+        self.words[usize::from(register)] = Some(word);
+    }
+
     /// Notes that a register has a double in its place already.
     fn note_double(&mut self, register: u8, double: Ssa) {
+        self.write_with_batch(register, None);
         let (register, variable) = (usize::from(register), self.doubles[usize::from(register)]);
         self.save_for_batch(register);
         self.kept_back.remove(register);
@@ -209,6 +220,13 @@ impl Translator<'_, '_> {
         self.b.ins().icmp_imm_s(IntCC::Equal, value, word as i64)
     }
 
+    /// Returns the sum of a fixnum and a constant one, and whether it is none.
+    pub(crate) fn add_constant(&mut self, x: Ssa, addend: i32) -> (Ssa, Ssa) {
+        let sum = self.b.ins().iadd_imm_s(x, Value::small(addend).bits() as i64);
+        let beyond = if addend < 0 { IntCC::SignedGreaterThan } else { IntCC::SignedLessThan };
+        (sum, self.b.ins().icmp(beyond, sum, x))
+    }
+
     /// Not zero unless both are fixnums. `None` if that is known.
     pub(crate) fn not_fixnums(&mut self, x: (Ssa, Known), y: (Ssa, Known)) -> Option<Ssa> {
         let both = match (x.1 == Known::Fixnum, y.1 == Known::Fixnum) {
@@ -220,14 +238,20 @@ impl Translator<'_, '_> {
         Some(self.b.ins().band_imm_s(both, 3))
     }
 
+    /// Zero if the bits of `mask` in a word are those of a tag.
+    pub(crate) fn differs_from_tag(&mut self, value: Ssa, tag: u64, mask: u64) -> Ssa {
+        let difference = self.b.ins().iadd_imm_s(value, -(tag as i64));
+        self.b.ins().band_imm_s(difference, mask as i64)
+    }
+
     pub(crate) fn is_cons(&mut self, value: Ssa) -> Ssa {
-        let tag = self.b.ins().band_imm_s(value, TAG_MASK as i64);
-        self.equals(tag, TAG_CONS)
+        let difference = self.differs_from_tag(value, TAG_CONS, TAG_MASK);
+        self.equals(difference, 0)
     }
 
     pub(crate) fn is_object(&mut self, value: Ssa) -> Ssa {
-        let tag = self.b.ins().band_imm_s(value, TAG_MASK as i64);
-        self.equals(tag, TAG_OBJECT)
+        let difference = self.differs_from_tag(value, TAG_OBJECT, TAG_MASK);
+        self.equals(difference, 0)
     }
 
     pub(crate) fn is_character(&mut self, value: Ssa) -> Ssa {
@@ -305,6 +329,22 @@ impl Translator<'_, '_> {
         self.go_to(done);
     }
 
+    /// As [`Translator::store_slot`], of a double. While objects are marked, only a slot that holds an
+    /// address needs the machine's help: there the machine code is left, so that nothing is called in a loop
+    /// whose doubles are in registers of the processor.
+    pub(crate) fn store_double_in_slot(&mut self, word: Ssa, address: Ssa, offset: i32) {
+        let (context, exit) = (self.context, self.exit());
+        let (plain, marked) = (self.block(), self.cold_block());
+        let is_marking = self.load_u32(context, offset_of!(NativeContext, is_marking) as i32);
+        self.branch(is_marking, marked, plain);
+        self.go_to(marked);
+        let old = self.load(address, offset);
+        let without_address = self.differs_from_tag(old, TAG_CONS, ADDRESS_MASK);
+        self.branch(without_address, plain, exit);
+        self.go_to(plain);
+        self.store(word, address, offset);
+    }
+
     // Slow ways and exits.
 
     /// Returns the address of a word of the bytecode.
@@ -314,11 +354,10 @@ impl Translator<'_, '_> {
 
     /// Has a function of the machine do the instruction, and returns what it says.
     ///
-    /// What is kept back is written first, on this way only.
+    /// What is kept back is put aside first, on this way only.
     pub(crate) fn call_helper(&mut self, helper: usize) -> Ssa {
         debug_assert!(self.batch.is_none(), "{}", self.at);
-        let (doubles, spent) = self.kept_back();
-        self.write_back(doubles, spent);
+        self.put_all_aside(self.kept_back);
         let (context, base, pc) = (self.context, self.base, self.pc(self.at));
         let helper = self.load_context(helper);
         let call = self.b.ins().call_indirect(self.helper_signature, helper, &[context, pc, base]);
@@ -397,11 +436,10 @@ impl Translator<'_, '_> {
         self.way_out(self.at, GUESSED_WRONG)
     }
 
-    /// Returns the block that writes what is kept back, and leaves at the instruction at a word.
+    /// Returns the block that puts aside what is kept back, and leaves at the instruction at a word.
     pub(crate) fn way_out(&mut self, at: usize, status: u64) -> Block {
         debug_assert!(self.batch.is_none(), "{at}");
-        let (doubles, spent) = self.kept_back();
-        let way = WayOut { at, status, doubles, spent };
+        let way = WayOut { at, status, kept_back: self.kept_back };
         if let Some(&block) = self.ways_out.get(&way) {
             return block;
         }
@@ -424,7 +462,7 @@ impl Translator<'_, '_> {
     pub(crate) fn emit_exits(&mut self) {
         for (way, block) in std::mem::take(&mut self.ways_out) {
             self.go_to(block);
-            self.write_back(way.doubles, way.spent);
+            self.put_all_aside(way.kept_back);
             self.leave_at(way.at, way.status);
         }
         if let Some(block) = self.signal.take() {

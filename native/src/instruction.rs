@@ -27,6 +27,8 @@ impl Translator<'_, '_> {
             step.instr,
             Instr::Move { .. }
                 | Instr::LoadConst { .. }
+                | Instr::LoadInt { .. }
+                | Instr::VectorRef { .. }
                 | Instr::Add { .. }
                 | Instr::Sub { .. }
                 | Instr::Mul { .. }
@@ -34,7 +36,11 @@ impl Translator<'_, '_> {
                 | Instr::AddInt { .. }
         );
         if !may_join_batch {
-            self.close_batch();
+            self.close_batch_for(match step.instr {
+                Instr::VectorSet { value, .. } | Instr::ArraySet { value, .. } => Some(value.0),
+                Instr::Return { src } => Some(src.0),
+                _ => None,
+            });
         }
         match step.instr {
             Instr::Move { dst, src } => {
@@ -42,14 +48,13 @@ impl Translator<'_, '_> {
                     let double = self.get_double(src.0);
                     self.set_double(dst.0, double);
                 } else {
-                    self.close_batch();
                     let (value, known) = self.operand(src.0);
-                    self.set(dst.0, value, known);
+                    self.set_with_batch(dst.0, value, known);
                 }
             }
             Instr::LoadInt { dst, value } => {
                 let (value, known) = self.fixnum(i32::from(value.0));
-                self.set(dst.0, value, known);
+                self.set_with_batch(dst.0, value, known);
             }
             Instr::LoadConst { dst, constant } => {
                 self.load_constant(dst.0, usize::from(constant.0));
@@ -195,10 +200,8 @@ impl Translator<'_, '_> {
                 let is_cons = self.is_cons(value);
                 self.loop_if(is_cons, step);
             }
-            Instr::LoopLess { left, right, .. } | Instr::LoopNotLess { left, right, .. } => {
-                self.tick();
-                self.jump_order(Less, left.0, right.0, step);
-            }
+            Instr::LoopLess { left, right, .. } => self.jump_order(Less, left.0, right.0, step),
+            Instr::LoopNotLess { left, right, .. } => self.jump_order(Less, left.0, right.0, step),
             Instr::LoopCount { counter, limit, step: by, .. } => {
                 self.loop_count(counter.0, limit.0, i32::from(by.0), step);
             }

@@ -78,6 +78,11 @@ impl NativeKinds {
         kinds
     }
 
+    /// Returns whether doubles are told from other values, which takes guesses.
+    pub(crate) fn tells_doubles(&self) -> bool {
+        self.tells_doubles
+    }
+
     /// Returns what is known of a constant.
     pub(crate) fn of_constant(&self, constant: Option<&Value>) -> Known {
         match constant.map_or(Known::Nothing, |&value| Known::of(value)) {
@@ -305,7 +310,8 @@ fn computed(instr: &Instr) -> Option<u8> {
         | Instr::Sub { dst, .. }
         | Instr::Mul { dst, .. }
         | Instr::Div { dst, .. }
-        | Instr::AddInt { dst, .. } => Some(dst.0),
+        | Instr::AddInt { dst, .. }
+        | Instr::VectorRef { dst, .. } => Some(dst.0),
         Instr::CallBuiltin { window, builtin, .. } if builtin.0 == Builtin::Sqrt.number() => Some(window.0),
         _ => None,
     }

@@ -11,8 +11,8 @@
 //! * **N3, truth.** Where machine code is left, and before it calls anything, all results are in the task's
 //!   stack. So whatever the machine code leaves can be taken up by the interpreter, at the instruction that
 //!   [`NativeContext::pc`] names in the frame [`NativeContext::base`]. Between, doubles may be kept back.
-//!   Those that are written on a way out are written as they are; [`NativeContext::raw_doubles`] names them,
-//!   and the machine makes words of them before anything else looks.
+//!   On a way out they are put aside, as they are; [`NativeContext::put_aside`] names them, and the machine
+//!   writes their words to the stack before anything else looks.
 //!   Where the function returns, they are no more; other words without an address are in their places.
 //!   Functions of the machine that look at no frame may be called while some are kept back.
 //! * **N4, exits.** Machine code is left at the beginning of an instruction, before it has had any effect
@@ -23,7 +23,7 @@
 //!   the instruction up, so that the interpreter meets the safepoint.
 //! * **N6, objects.** Nothing collects while machine code runs, and no object moves. An address is followed
 //!   only after the tests that the interpreter makes. A slot is overwritten without the machine's help only
-//!   while nothing is marked ([`NativeContext::is_marking`]).
+//!   while nothing is marked ([`NativeContext::is_marking`]), or where it holds no address.
 //! * **N7, native stack.** A frame of machine code holds nothing that another one needs. There are as many as
 //!   fit between the base at the entry and [`NativeContext::limit`], which the interpreter keeps near.
 //!
@@ -48,7 +48,7 @@ mod places;
 mod special;
 mod translate;
 
-pub use abi::{AGAIN, GUESSED_WRONG, NativeContext, NativeReply, RETURN_VALUES, RETURNED, SIGNAL};
+pub use abi::{AGAIN, GUESSED_WRONG, IN_PLACE, NativeContext, NativeReply, RETURN_VALUES, RETURNED, SIGNAL};
 pub use helper::{MachineCodeHelper, MadeCode};
 pub use kinds::Known;
 pub use maker::{MachineCode, MachineCodeMaker, NativeSource, NotMade};

@@ -8,7 +8,7 @@ use esl_heap::Value;
 use esl_heap::heap::Kind;
 use esl_heap::heap::layout::{FunctionObject, Header, Str};
 
-use crate::abi::NativeContext;
+use crate::abi::{AGAIN, GUESSED_WRONG, NativeContext};
 use crate::emit::{ELEMENTS, WORD, in_cons, in_object, memory};
 use crate::kinds::Known;
 use crate::translate::Translator;
@@ -33,8 +33,18 @@ impl Translator<'_, '_> {
         self.finish_effect(slow);
     }
 
-    /// An element of a simple vector. What is none, or is not there, fails by the interpreter.
+    /// An element of a simple vector. What is none, or is not there, fails by the interpreter. One that is
+    /// guessed to be a double is kept back, and joins the batch.
     pub(crate) fn simple_element_ref(&mut self, dst: u8, vector: u8, index: u8) {
+        if self.guess == Some(dst) {
+            let (vector, index, exit) = (self.get(vector), self.operand(index), self.exit_of_batch(AGAIN));
+            let element = self.simple_element(vector, index, exit);
+            let value = self.load(element, in_object(ELEMENTS as usize));
+            let wrong = self.exit_of_batch(GUESSED_WRONG);
+            let double = self.double_of(value, wrong);
+            return self.set_double_of(dst, double, value);
+        }
+        self.close_batch();
         let (vector, index, exit) = (self.get(vector), self.operand(index), self.exit());
         let element = self.simple_element(vector, index, exit);
         let value = self.load(element, in_object(ELEMENTS as usize));
@@ -62,8 +72,11 @@ impl Translator<'_, '_> {
     pub(crate) fn simple_element_set(&mut self, vector: u8, index: u8, value: u8) {
         self.make_word(usize::from(value));
         let (vector, index, exit) = (self.get(vector), self.operand(index), self.exit());
-        let value = self.get(value);
+        let (value, known) = self.operand(value);
         let element = self.simple_element(vector, index, exit);
+        if known == Known::Double {
+            return self.store_double_in_slot(value, element, in_object(ELEMENTS as usize));
+        }
         self.store_slot(value, element, in_object(ELEMENTS as usize));
     }
 

@@ -31,6 +31,14 @@ impl RegisterBits {
         (first..first + count).for_each(|register| self.remove(register));
     }
 
+    /// Returns those that are not in `others`.
+    pub(crate) fn without(mut self, others: RegisterBits) -> RegisterBits {
+        for (word, less) in self.0.iter_mut().zip(others.0) {
+            *word &= !less;
+        }
+        self
+    }
+
     /// Inserts all of `others`; returns whether that changed anything.
     pub(crate) fn unite(&mut self, others: RegisterBits) -> bool {
         let before = *self;
@@ -50,7 +58,7 @@ impl RegisterBits {
     }
 }
 
-/// Where machine code is left, and what has to be written to the stack before that. Two ways out with the
+/// Where machine code is left, and what has to be put aside before that. Two ways out with the
 /// same answer share a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct WayOut {
@@ -58,8 +66,6 @@ pub(crate) struct WayOut {
     pub(crate) at: usize,
     /// One of the statuses of `abi`.
     pub(crate) status: u64,
-    /// RegisterBits that hold doubles that are kept back.
-    pub(crate) doubles: RegisterBits,
-    /// RegisterBits of which the processor's register tells whether they are kept back.
-    pub(crate) spent: RegisterBits,
+    /// RegisterBits that are kept back, or may be.
+    pub(crate) kept_back: RegisterBits,
 }

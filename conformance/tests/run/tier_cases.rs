@@ -27,7 +27,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 ";
 
 /// Name and text of each.
-const CASES: [(&str, &str); 9] = [
+const CASES: [(&str, &str); 11] = [
     (
         "functions redefined while they run",
         "(defun step-of (x) (+ x 1))
@@ -107,6 +107,55 @@ const CASES: [(&str, &str); 9] = [
          (print (scale (of 1 2 3) 2.0)) (print (scale (of 1/2 1.0 3) 3))
          (print (handler-case (scale (of 1.0 :x 2.0) 2.0) (error (e) (type-of e))))
          (print (handler-case (scale (list 1.0) 2.0) (error (e) (type-of e))))",
+    ),
+    (
+        "loads among operations on doubles",
+        "(defun of (&rest items) (coerce items 'simple-vector))
+         (defun mix (v w n)
+           (let ((sum 0.0) (x 1.0) (y 0.5))
+             (dotimes (i n)
+               (let* ((a (svref v i)) (dx (- x a)) (b (svref w i)) (dy (* b dx)) (k 3) (other k)
+                      (c (svref v 0)) (d (- (* c dy) y)) (same c) (e (* same 0.25)))
+                 (setf (svref w i) d)
+                 (setf (svref v i) (+ (svref v i) (* dx 0.5)))
+                 (setq k (if (> d 100.0) d k))
+                 (setq x (+ (* dx 0.5) e) y (- d (svref w 0)))
+                 (setf (svref v (- n 1)) x (svref w (- n 1)) y)
+                 (incf sum (+ (* d 0.125) (svref v i) y k other))))
+             (list x y sum)))
+         (defun try (v w n)
+           (print (handler-case (mix v w n) (error (e) (type-of e)))) (print (list v w)))
+         (defun doubles () (of 1.0 -2.5 0.0 4.0 0.125))
+         (dotimes (i 40) (try (doubles) (of 0.5 1.5 -0.0 2.0 (* i 0.25)) (+ 1 (mod i 5))))
+         (try (doubles) (doubles) 7) (try (of 1.0 2 3.0) (of 1.0 2.0 3) 3) (try (of 1/2 2.0) (of 2.0 1/3) 2)
+         (try (of 1.0e150 1.0e-150 3.0) (of 1.0e150 1.0e-140 1.0e200) 3)
+         (try (of 1.0e300 1.0) (of 1.0e300 1.0) 2)
+         (try (of 1.0 nil 2.0) (doubles) 3) (try (doubles) (of 1.0 2.0 :x) 3) (try (list 1.0) (doubles) 1)
+         (try (doubles) nil 1) (dotimes (i 70) (try (of 1 2 3) (of 1.0 2.0 3.0) 3))
+         (try (doubles) (doubles) 5)",
+    ),
+    (
+        "calls whose windows held doubles",
+        "(defun half (x) (* x 0.5))
+         (defun pick (x i) (cond ((= 0 (mod i 11)) i) ((= 0 (mod i 17)) (list x)) (t (half x))))
+         (defun calls (n)
+           (let ((sum 0.0) (others nil))
+             (dotimes (i n)
+               (let ((a (* sum 0.5)) (b (pick (+ sum 1.0) i)))
+                 (if (numberp b) (setq sum (+ (half (* a 1.5)) b (pick (- a b) (+ 1 (* 2 i))) ))
+                     (setq others (list a (car b)) sum (half (+ a 1.0))))
+                 (when (consp sum) (return (list :consp sum)))))
+             (list sum others)))
+         (defun try (n) (print (handler-case (calls n) (error (e) (type-of e)))))
+         (dotimes (i 30) (try i)) (try 500)
+         (defun safe (n)
+           (let ((sum 0.0))
+             (dotimes (i n)
+               (setq sum (+ (* sum 0.5) (half (+ sum (half i)))))
+               (when (= i 90) (setf (symbol-function 'half) (lambda (x) (* x 0.25)))))
+             sum))
+         (print (safe 20)) (print (safe 300))
+         (setf (symbol-function 'half) (lambda (x &optional (by 0.75)) (* x by))) (print (safe 50))",
     ),
     (
         "special variables while doubles are kept back",

@@ -203,7 +203,7 @@ impl Scheduler {
     /// Puts a task at the end of its queue, or of the urgent one. Returns whether it was parked. One at rest
     /// stays there; that it was to go on is noted.
     pub(crate) fn make_runnable(&mut self, index: TaskIndex, urgent: bool) -> bool {
-        let Some(task) = self.tasks.to_go_on(index) else { return false };
+        let Some(task) = self.tasks.wake_up(index) else { return false };
         let serial = self.serial.advance();
         let was_parked = std::mem::replace(&mut task.state, TaskState::Runnable) != TaskState::Runnable;
         task.serial = serial;

@@ -169,7 +169,7 @@ impl Tasks {
     /// Returns the task with this index, which is to go on, unless it runs or is at rest. Of one at rest that
     /// is noted.
     #[inline(always)]
-    pub(crate) fn to_go_on(&mut self, index: TaskIndex) -> Option<&mut Task> {
+    pub(crate) fn wake_up(&mut self, index: TaskIndex) -> Option<&mut Task> {
         let place = self.places.get_mut(index.as_usize())?;
         if place.rest != Rest::None {
             place.rest = Rest::Woken;
@@ -310,13 +310,14 @@ mod tests {
     fn that_a_task_at_rest_was_to_go_on_is_noted_until_it_ends() {
         let (mut tasks, mut heap) = (Tasks::default(), heap_for_tests());
         let id = tasks.insert(task());
-        assert!(tasks.to_go_on(id.index).is_some() && tasks.rest_mut(id.index).is_none());
+        assert!(tasks.wake_up(id.index).is_some() && tasks.rest_mut(id.index).is_none());
         tasks.make_standstills(&mut heap);
         *tasks.rest_mut(id.index).unwrap().0 = Rest::Rests;
-        assert!(tasks.to_go_on(id.index).is_none());
+        assert!(tasks.wake_up(id.index).is_none());
         assert_eq!(tasks.rest(id.index), Rest::Woken);
         tasks.remove(id);
-        assert_eq!(tasks.rest(tasks.insert(task()).index), Rest::None);
+        let next = tasks.insert(task());
+        assert_eq!((next.index, tasks.rest(next.index)), (id.index, Rest::None));
     }
 
     #[test]

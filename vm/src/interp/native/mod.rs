@@ -12,10 +12,13 @@ mod make;
 mod step;
 
 use std::ffi::c_void;
+use std::mem::MaybeUninit;
 
 use esl_bytecode::opcode::Opcode;
 use esl_native::abi::{EntryStub, NativeEntry, TAIL};
-use esl_native::{AGAIN, GUESSED_WRONG, Known, NativeContext, NativeReply, RETURN_VALUES, RETURNED};
+use esl_native::{
+    AGAIN, GUESSED_WRONG, IN_PLACE, Known, NativeContext, NativeReply, RETURN_VALUES, RETURNED,
+};
 
 use super::{Signal, aux_at, code_of, constant, first_instruction, stubs, word_at};
 use crate::fused::quicken_loop;
@@ -186,7 +189,8 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         pc: 0,
         base: 0,
         value: 0,
-        raw_doubles: [0; 4],
+        put_aside: [0; 4],
+        doubles: [MaybeUninit::uninit(); 256],
         machine: (&raw mut caller).cast::<c_void>(),
         step: step::step,
         call_builtin: step::call_builtin,
@@ -265,25 +269,29 @@ unsafe fn is_as_said(vm: &Vm, pc: u64, base: *mut Value) -> bool {
     }
 }
 
-/// Makes words of the doubles that machine code has written as they are.
+/// Writes the words of the doubles that machine code has put aside.
 ///
 /// # Safety
 /// `base` is the frame in which machine code was left, or has called the machine.
 #[inline]
 unsafe fn make_words(context: &mut NativeContext, base: *mut Value) {
-    for (index, names) in context.raw_doubles.iter_mut().enumerate() {
+    for (index, names) in context.put_aside.iter_mut().enumerate() {
         while *names != 0 {
             let register = index * 64 + names.trailing_zeros() as usize;
             *names &= *names - 1;
-            // SAFETY: N3: the place is one of the frame, and has the bits of a double.
+            // SAFETY: N3: machine code has written the bits of what it names, and the place is one of the
+            // frame.
             unsafe {
-                let place = base.add(register);
-                let double = Value::double(place.cast::<f64>().read());
+                let bits = context.doubles[register].assume_init();
+                if bits == IN_PLACE {
+                    continue;
+                }
+                let double = Value::double(f64::from_bits(bits));
                 debug_assert!(
                     double.is_some_and(|v| v.as_double().is_some_and(f64::is_finite)),
                     "{register}"
                 );
-                place.write(double.unwrap_or(Value::NAN));
+                base.add(register).write(double.unwrap_or(Value::NAN));
             }
         }
     }
