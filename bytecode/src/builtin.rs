@@ -1423,9 +1423,9 @@ macro_rules! for_each_builtin {
             InputDropped = input::input_dropped, internal "%INPUT-DROPPED" ("input");
             /// Whether an object is an input.
             Inputp = input::inputp, internal "%INPUTP" ("object");
-            /// The time in so many seconds, in nanoseconds.
-            Deadline = event::deadline, internal "%DEADLINE" ("seconds");
-            /// Waits until a time in nanoseconds.
+            /// The time in so many seconds, in nanoseconds; fewer than 0 count as 0, or fail if `strict`.
+            Deadline = event::deadline, internal "%DEADLINE" ("seconds &optional strict");
+            /// Waits until a time in nanoseconds, as far as the clock was read last.
             SleepUntil = event::sleep_until, internal "%SLEEP-UNTIL" ("deadline");
             /// Has a function called, in a task of its own, for each signal of the process of this number.
             OnSignal = event::on_signal, internal "%ON-SIGNAL" ("number function");

@@ -4,8 +4,9 @@
 //! task's `wait` is what it was parked at.
 
 use crate::builtins::list::list_items;
-use crate::heap::Kind;
+use crate::heap::{Heap, Kind};
 use crate::host::ProcessSignal;
+use crate::number;
 use crate::raise::{Exit, Outcome};
 use crate::run;
 use crate::schedule::TurnEnd;
@@ -27,8 +28,20 @@ pub(crate) fn nanoseconds(vm: &mut Vm, seconds: Value) -> Result<u64, Exit> {
         return Ok((n.max(0) as u64).saturating_mul(1_000_000_000).min(LATEST));
     }
     // What is too large for a double is infinite; a conversion of floats saturates.
-    let seconds = vm.nearest_double(seconds, "REAL")?;
+    let seconds = match seconds.as_double() {
+        Some(seconds) => seconds,
+        None => vm.nearest_double(seconds, "REAL")?,
+    };
     Ok(((seconds * 1e9).round() as u64).min(LATEST))
+}
+
+/// Returns whether `seconds` is a number below zero.
+#[inline]
+fn is_negative(heap: &Heap, seconds: Value) -> bool {
+    match seconds.as_double() {
+        Some(seconds) => seconds < 0.0,
+        None => number::sign_of(heap, seconds) == Some(-1),
+    }
 }
 
 /// Returns the time of the running task's clock.
@@ -381,6 +394,9 @@ pub(super) fn close_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn deadline(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if optional(arguments, 1).is_true() && is_negative(&vm.heap, arguments[0]) {
+        return vm.exchange.not_written(arguments[0], "(REAL 0)");
+    }
     let nanoseconds = nanoseconds(vm, arguments[0])?;
     let time = time_of_task(vm).saturating_add(nanoseconds).min(LATEST);
     Ok(Value::fixnum(time as i64).unwrap_or(Value::NIL))
@@ -390,10 +406,12 @@ pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(deadline) = arguments[0].as_fixnum().and_then(|time| u64::try_from(time).ok()) else {
         return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
     };
-    if time_of_task(vm) >= deadline {
+    // The clock was read to make the deadline, and again to fire the timer that ends the wait.
+    let standstill = vm.scheduler.standstill();
+    if standstill.time_at(vm.scheduler.clock.now) >= deadline {
         Ok(Value::NIL)
     } else {
-        let time = vm.scheduler.standstill().when(deadline);
+        let time = standstill.when(deadline);
         vm.scheduler.park_at(Value::NIL, Some(time))
     }
 }
