@@ -15,6 +15,7 @@
 //! Not here: which package is the current one, and what a symbol stands for (the virtual machine).
 
 mod change;
+mod entries;
 mod standard;
 
 use std::borrow::Cow;
@@ -28,6 +29,7 @@ use rustc_hash::FxHashMap;
 use crate::compile::InternError;
 use crate::symbol::{Home, KEYWORD_PACKAGE, Symbol};
 
+use entries::NameEntries;
 pub use standard::{CL_NAMES, TAKEN_OVER};
 
 /// A package: its number in the table.
@@ -80,7 +82,7 @@ struct Package {
     exports_again: Option<PackageId>,
     /// Names of external symbols that are at home here and may have no entry yet, sorted.
     names: &'static [&'static str],
-    symbols: FxHashMap<Cow<'static, str>, NameEntry>,
+    symbols: NameEntries,
 }
 
 /// All packages of a program.
@@ -151,7 +153,7 @@ impl Packages {
             uses: Vec::new(),
             exports_again: None,
             names: &[],
-            symbols: FxHashMap::default(),
+            symbols: NameEntries::default(),
         });
         id
     }
@@ -257,6 +259,11 @@ impl Packages {
         self.table[package].symbols.reserve(symbols);
     }
 
+    /// Has copies that are made from now on share the symbols of a package, after many were added.
+    pub fn share(&mut self, package: PackageId) {
+        self.table[package].symbols.share();
+    }
+
     /// Returns the home of the external symbol `name` of `package`, and the package of which it is an
     /// external entry.
     fn external(&self, package: PackageId, name: &str) -> Option<FoundName> {
@@ -292,6 +299,11 @@ impl Packages {
         let (found, status) = self.look_up(package, name)?;
         let known = self.table[found.entry_of].symbols.get(name).and_then(|entry| entry.symbol.clone());
         Some((known.unwrap_or_else(|| Symbol::new(&self.table[found.home].name, name)), status))
+    }
+
+    /// Returns whether `name` denotes a symbol in `package`.
+    pub fn has(&self, package: PackageId, name: &str) -> bool {
+        self.look_up(package, name).is_some()
     }
 
     /// Returns the symbol that `name` denotes in `package`; a new one, at home there, if there was none (then

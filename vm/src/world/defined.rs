@@ -30,6 +30,7 @@ impl World {
         for name in self.images.exports() {
             self.packages.register(PackageId::ESL, name, true);
         }
+        self.packages.share(PackageId::ESL);
         // Symbols with objects have missed the new definitions.
         self.undefined_yet.extend(self.symbols.keys().cloned());
         self.define_symbols(heap)?;

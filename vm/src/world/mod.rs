@@ -265,7 +265,7 @@ impl World {
             None => (Value::NIL, 0),
             Some(name) => {
                 let (home, object) = self.home(heap, name)?;
-                if self.packages.find(home, symbol.name()).is_none() {
+                if !self.packages.has(home, symbol.name()) {
                     let is_external = home == PackageId::KEYWORD;
                     self.packages.register(home, symbol.name().to_owned(), is_external);
                 }
