@@ -154,6 +154,18 @@ macro_rules! define_fused {
             fits: $fits,
         } ),*];
 
+        /// For each opcode, which of [`FUSED`] begin with it, a bit for each.
+        static BEGINS: [u64; 256] = {
+            let firsts = [$( [$( Opcode::$part as u8 ),+][0] ),*];
+            let mut begins = [0; 256];
+            let mut index = 0;
+            while index < firsts.len() {
+                begins[firsts[index] as usize] |= 1 << index;
+                index += 1;
+            }
+            begins
+        };
+
         /// The opcode of the first part of each fused instruction, by its number.
         const ORIGINALS: [u8; 256 - FIRST as usize] = {
             let mut originals = [0; 256 - FIRST as usize];
@@ -238,38 +250,30 @@ pub(crate) fn fuse(words: &mut [u32]) {
 
 /// Returns the first fused instruction whose parts these words begin with.
 fn fused_at(first: Opcode, words: &[u32]) -> Option<&'static FusedInstruction> {
-    if !BEGINS[first as usize] {
-        return None;
-    }
-    FUSED.iter().find(|fused| {
+    let mut open = BEGINS[first as usize];
+    while open != 0 {
+        let fused = &FUSED[open.trailing_zeros() as usize];
+        open &= open - 1;
         let count = fused.parts.len();
         let mut parts = [Word(0); MOST_PARTS];
-        if fused.parts[0] != first || words.len() < count {
-            return false;
+        if words.len() < count {
+            continue;
         }
         for (part, &word) in parts.iter_mut().zip(&words[..count]) {
             *part = Word(word);
         }
         let parts = &parts[..count];
-        parts.iter().zip(fused.parts).all(|(word, &part)| word.opcode() == Some(part)) && (fused.fits)(parts)
-    })
+        if parts.iter().zip(fused.parts).all(|(word, &part)| word.opcode() == Some(part))
+            && (fused.fits)(parts)
+        {
+            return Some(fused);
+        }
+    }
+    None
 }
 
 /// Largest number of parts.
 const MOST_PARTS: usize = 3;
-
-/// For each opcode, whether a fused instruction begins with it.
-static BEGINS: [bool; 256] = {
-    let mut begins = [false; 256];
-    let mut number = 0;
-    while number < ORIGINALS.len() {
-        if number < (QUICK_LOOP - FIRST) as usize {
-            begins[ORIGINALS[number] as usize] = ORIGINALS[number] != 0;
-        }
-        number += 1;
-    }
-    begins
-};
 
 fn fits_always(_: &[Word]) -> bool {
     true
