@@ -44,6 +44,18 @@ pub(crate) fn restore_heap(heap: &mut Heap, image: &HeapImage) -> bool {
     unsafe { heap.restore(image) }
 }
 
+/// Creates a vector of nothing yet for the loader of images, who hands it to nobody and changes it by
+/// [`Heap::own_vector_set`].
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn alloc_image_table(heap: &mut Heap, len: usize) -> Result<Value, AllocError> {
+    let table = heap.alloc_vector_filled(len, Value::UNSUPPLIED)?;
+    // SAFETY: the loader does as said above; no program gets hold of its tables.
+    unsafe { heap.own_vector(table) };
+    Ok(table)
+}
+
 /// Creates a heap for a unit test that needs no machine.
 #[cfg(test)]
 pub(crate) fn heap_for_tests() -> Heap {

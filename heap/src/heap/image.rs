@@ -2,7 +2,9 @@
 //!
 //! An image consists of pages. A page that is as it was in another image is shared with that one, so an image
 //! of a heap in which little has changed since takes little memory; to find out, the pages are compared. The
-//! memory of arenas and large objects lives as long as an image needs it, even if the heap has given it up.
+//! pages of large vectors that are the machine's own ([`Heap::own_vector`]) have numbers, which each change
+//! renews, and are compared by these. The memory of arenas and large objects lives as long as an image needs
+//! it, even if the heap has given it up.
 //!
 //! Guarantees: after [`Heap::restore`] the heap goes on as after [`Heap::save`], to the byte: the same
 //! allocations return the same addresses and ask for slices at the same points.
@@ -15,9 +17,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::alloc::Region;
 use super::arena::{Arena, ArenaMemory, BLOCK, BLOCKS, BlockInfo};
 use super::external::External;
-use super::large::{LargeHeader, LargeMemory, LargeObject};
+use super::large::{self, LargeHeader, LargeMemory, LargeObject};
+use super::layout::Header;
 use super::sweep::Sweep;
-use super::{Heap, HeapStats, Pacing, Phase};
+use super::{Heap, HeapStats, Kind, Pacing, Phase};
+use crate::value::Value;
 
 /// Bytes of a page.
 const PAGE: usize = 1024;
@@ -42,14 +46,18 @@ impl Page {
     /// Returns the page with these contents: `old`, if it has them.
     fn like(old: Option<&Arc<Page>>, bytes: &[u8], count: &Arc<AtomicUsize>) -> Arc<Page> {
         match old {
-            Some(old) if *old.bytes == *bytes => old.clone(),
+            Some(old) if old.is_like(bytes) => old.clone(),
             _ => Page::of(bytes, count),
         }
     }
 
+    fn is_like(&self, bytes: &[u8]) -> bool {
+        *self.bytes == *bytes
+    }
+
     /// Writes the contents to where they come from.
     fn put(&self, bytes: &mut [u8]) {
-        if *self.bytes != *bytes {
+        if !self.is_like(bytes) {
             bytes.copy_from_slice(&self.bytes);
         }
     }
@@ -81,7 +89,17 @@ struct ArenaImage {
 struct LargeImage {
     memory: Arc<LargeMemory>,
     header: LargeHeader,
-    contents: Arc<Page>,
+    /// Numbers of the pages, if they have any.
+    numbers: Vec<u64>,
+    contents: Vec<Arc<Page>>,
+}
+
+impl LargeImage {
+    /// Returns whether a page has the contents that it has in the object, as its number says.
+    fn has_page_of(&self, object: &LargeObject, page: usize) -> bool {
+        let number = self.numbers.get(page);
+        number.is_some() && number == object.numbers.get(page)
+    }
 }
 
 /// The contents of a heap at a time.
@@ -141,12 +159,25 @@ impl Heap {
         let large = self.large.iter_mut().enumerate().map(|(index, object)| {
             let old = base.and_then(|base| base.large.get(index));
             let old = old.filter(|old| Arc::ptr_eq(&old.memory, object.memory()));
-            let header = *object.header();
+            let (header, numbers) = (*object.header(), object.numbers.clone());
+            let kept = |page: usize| {
+                let kept = old.filter(|old| old.has_page_of(object, page))?;
+                kept.contents.get(page).cloned()
+            };
+            let kept: Vec<Option<Arc<Page>>> = (0..numbers.len()).map(kept).collect();
             // SAFETY: the heap has images, so the object was made zeroed; its header is its own, and nobody
             // else has the heap.
             let bytes = unsafe { object.bytes_mut() };
-            let contents = Page::like(old.map(|old| &old.contents), bytes, &count);
-            LargeImage { memory: object.memory().clone(), header, contents }
+            let mut kept = kept.into_iter();
+            let pages = bytes.chunks(PAGE).enumerate().map(|(page, bytes)| match kept.next().flatten() {
+                Some(kept) => {
+                    debug_assert!(kept.is_like(bytes), "a page with a number has changed");
+                    kept
+                }
+                None => Page::like(old.and_then(|old| old.contents.get(page)), bytes, &count),
+            });
+            let contents = pages.collect();
+            LargeImage { memory: object.memory().clone(), header, numbers, contents }
         });
         Some(HeapImage {
             large: large.collect(),
@@ -186,12 +217,22 @@ impl Heap {
             Some(restore_arena(now, arena.as_ref()?))
         });
         self.arenas = arenas.collect();
-        let large = image.large.iter().map(|object| {
+        let present = std::mem::take(&mut self.large);
+        let large = image.large.iter().enumerate().map(|(index, object)| {
+            let now = present.get(index).filter(|now| Arc::ptr_eq(now.memory(), &object.memory));
             // SAFETY: the header is that of the time of the image, and the heap, which has the object, is
             // borrowed mutably.
-            let mut again = unsafe { LargeObject::again(&object.memory, object.header) };
+            let mut again =
+                unsafe { LargeObject::again(&object.memory, object.header, object.numbers.clone()) };
             // SAFETY: the heap has images, so the object was made zeroed; its header is its own.
-            object.contents.put(unsafe { again.bytes_mut() });
+            let bytes = unsafe { again.bytes_mut() };
+            for (page, (contents, bytes)) in object.contents.iter().zip(bytes.chunks_mut(PAGE)).enumerate() {
+                if now.is_some_and(|now| object.has_page_of(now, page)) {
+                    debug_assert!(contents.is_like(bytes), "a page with a number has changed");
+                } else {
+                    contents.put(bytes);
+                }
+            }
             again
         });
         self.large = large.collect();
@@ -209,6 +250,48 @@ impl Heap {
     }
 }
 
+impl Heap {
+    /// Makes a simple vector the machine's own. If it is large, images compare its pages by numbers.
+    ///
+    /// # Safety
+    /// From now on the vector is changed by [`Heap::own_vector_set`] only.
+    pub unsafe fn own_vector(&mut self, v: Value) {
+        let first = self.numbered + 1;
+        let Some(object) = self.large_vector(v) else { return };
+        let pages = (object.header().bytes - large::footprint(0)).div_ceil(PAGE) as u64;
+        object.numbers = (first..first + pages).collect();
+        self.numbered += pages;
+    }
+
+    /// Sets an element of a simple vector that is the machine's own; `None` if `v` is not a simple vector or
+    /// has no such element.
+    pub fn own_vector_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
+        self.vector_set(v, index, new)?;
+        let number = self.numbered + 1;
+        if let Some(object) = self.large_vector(v)
+            && let Some(page) =
+                object.numbers.get_mut((size_of::<Header>() + index * size_of::<Value>()) / PAGE)
+        {
+            *page = number;
+            self.numbered = number;
+        }
+        Some(())
+    }
+
+    /// Returns a simple vector that is large.
+    fn large_vector(&mut self, v: Value) -> Option<&mut LargeObject> {
+        let object = self.object_of(v, Kind::SimpleVector)?;
+        // SAFETY: H1, H2: the value is the address of a live object, which by its size is large.
+        let index = unsafe {
+            if !large::is_large((*object).size()) {
+                return None;
+            }
+            (*large::header_of(object)).index
+        };
+        self.large.get_mut(index)
+    }
+}
+
 /// Returns the contents of a block: those of `old`, where they are the same.
 fn block_image(
     arena: &mut Arena,
@@ -219,29 +302,30 @@ fn block_image(
 ) -> Arc<BlockImage> {
     let metadata = Page::like(old.map(|old| &old.metadata), arena.metadata(block), count);
     let address = arena.address(block);
+    let is_room = |page: usize| {
+        let (from, to) = (address + page * PAGE, address + (page + 1) * PAGE);
+        unused.iter().any(|range| range.start <= from && to <= range.end)
+    };
     // SAFETY: the heap has images, so the arena was made zeroed, and nobody else has the heap.
     let bytes = unsafe { arena.objects_mut(block) };
-    let pages: [Option<Arc<Page>>; BLOCK_PAGES] = std::array::from_fn(|page| {
-        let (from, to) = (page * PAGE, (page + 1) * PAGE);
-        let is_room =
-            |range: &std::ops::Range<usize>| range.start <= address + from && address + to <= range.end;
-        if unused.iter().any(is_room) {
-            return None;
-        }
-        Some(Page::like(old.and_then(|old| old.pages[page].as_ref()), &bytes[from..to], count))
+    let bytes = |page: usize| &bytes[page * PAGE..(page + 1) * PAGE];
+    let is_same: [bool; BLOCK_PAGES] = std::array::from_fn(|page| match old.map(|old| &old.pages[page]) {
+        Some(Some(old)) => !is_room(page) && old.is_like(bytes(page)),
+        Some(None) => is_room(page),
+        None => false,
     });
-    let is_same = |old: &Arc<BlockImage>| {
-        let same = |(old, new): (&Option<Arc<Page>>, &Option<Arc<Page>>)| match (old, new) {
-            (Some(old), Some(new)) => Arc::ptr_eq(old, new),
-            (None, None) => true,
-            _ => false,
-        };
-        Arc::ptr_eq(&old.metadata, &metadata) && old.pages.iter().zip(&pages).all(same)
-    };
-    match old {
-        Some(old) if is_same(old) => old.clone(),
-        _ => Arc::new(BlockImage { metadata, pages }),
+    if let Some(old) = old
+        && Arc::ptr_eq(&old.metadata, &metadata)
+        && is_same.iter().all(|&is_same| is_same)
+    {
+        return old.clone();
     }
+    let pages = std::array::from_fn(|page| match old {
+        Some(old) if is_same[page] => old.pages[page].clone(),
+        _ if is_room(page) => None,
+        _ => Some(Page::of(bytes(page), count)),
+    });
+    Arc::new(BlockImage { metadata, pages })
 }
 
 /// Returns an arena as it was. `now` is what has its number at present.
@@ -344,6 +428,35 @@ mod tests {
         heap.cons(Value::T, Value::NIL).expect("there is room");
         let _second = heap.save(Some(&first)).expect("the collector rests");
         assert!(first.bytes_of_all() - taken <= 2 * (PAGE + PAGE_BYTES));
+    }
+
+    #[test]
+    fn vectors_of_the_machine_are_compared_by_the_numbers_of_their_pages() {
+        let mut heap = heap();
+        let vector = heap.alloc_vector_filled(2 * BLOCK / 8, Value::NIL).expect("there is room");
+        // SAFETY: the vector is changed as the machine's own only.
+        unsafe { heap.own_vector(vector) };
+        let mut images = vec![heap.save(None).expect("the collector rests")];
+        for index in [0, 5000, 5000] {
+            heap.own_vector_set(vector, index, Value::index(images.len())).expect("it has the element");
+            let image = heap.save(images.last()).expect("the collector rests");
+            images.push(image);
+        }
+        let taken = images[0].bytes_of_all();
+        images.push(heap.save(images.last()).expect("the collector rests"));
+        assert_eq!(images[0].bytes_of_all(), taken);
+        let at = |heap: &Heap, index: usize| heap.vector(vector).expect("it is a vector")[index];
+        let (none, one, two, three) = (Value::NIL, Value::index(1), Value::index(2), Value::index(3));
+        for (image, first, other) in [(3, one, three), (1, one, none), (0, none, none), (2, one, two)] {
+            // SAFETY: the vector is older than the images.
+            assert!(unsafe { heap.restore(&images[image]) });
+            assert_eq!((at(&heap, 0), at(&heap, 5000)), (first, other));
+            heap.own_vector_set(vector, 7, Value::T).expect("it has the element");
+            // SAFETY: as above.
+            assert!(unsafe { heap.restore(&images[image]) });
+            assert_eq!((at(&heap, 0), at(&heap, 5000), at(&heap, 7)), (first, other, none));
+        }
+        assert!(taken < 2 * BLOCK + 12 * (PAGE + PAGE_BYTES) + 2 * BLOCK / 8);
     }
 
     #[test]

@@ -84,10 +84,13 @@ impl Drop for LargeMemory {
 pub(super) struct LargeObject {
     start: NonNull<LargeHeader>,
     memory: Arc<LargeMemory>,
+    /// Numbers of the pages, if these are the machine's own: contents have one that no others have had
+    /// ([`super::image`]).
+    pub(super) numbers: Vec<u64>,
 }
 
 // The header and the object are the run's, their address is the process's.
-list_state! { LargeObject { start: Parts by tell_header, memory: Process } }
+list_state! { LargeObject { start: Parts by tell_header, memory: Process, numbers: Process } }
 
 fn tell_header(header: &NonNull<LargeHeader>, sink: &mut dyn StateSink) {
     // SAFETY: the header lives as long as the object that owns it, which the caller borrows.
@@ -112,18 +115,22 @@ impl LargeObject {
             let start = NonNull::new(start)?.cast::<LargeHeader>();
             start.write(LargeHeader { bytes, number, index, epoch, gray: false, filled: 0 });
             start.as_ptr().expose_provenance();
-            Some(LargeObject { start, memory: Arc::new(LargeMemory { start, bytes }) })
+            Some(LargeObject { start, memory: Arc::new(LargeMemory { start, bytes }), numbers: Vec::new() })
         }
     }
 
-    /// Returns the object with this memory, which has this header again.
+    /// Returns the object with this memory, which has this header and pages of these numbers again.
     ///
     /// # Safety
     /// The header is one that this object has had, and nobody borrows the object.
-    pub(super) unsafe fn again(memory: &Arc<LargeMemory>, header: LargeHeader) -> LargeObject {
+    pub(super) unsafe fn again(
+        memory: &Arc<LargeMemory>,
+        header: LargeHeader,
+        numbers: Vec<u64>,
+    ) -> LargeObject {
         // SAFETY: the memory is live, begins with the header, and by the contract nobody borrows it.
         unsafe { memory.start.write(header) };
-        LargeObject { start: memory.start, memory: memory.clone() }
+        LargeObject { start: memory.start, memory: memory.clone(), numbers }
     }
 
     /// Returns the memory.

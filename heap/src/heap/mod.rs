@@ -213,6 +213,8 @@ pub struct Heap {
     has_images: bool,
     /// What tells its images from those of other heaps.
     identity: Arc<()>,
+    /// Greatest number of a page of a vector that is the machine's own ([`Heap::own_vector`]).
+    numbered: u64,
 }
 
 list_state! { Pacing { floor: Run, threshold: Run, since_cycle: Run, black: Run, owed: Run } }
@@ -253,6 +255,7 @@ list_state! {
         stats: Parts,
         has_images: Process,
         identity: Process,
+        numbered: Process,
     }
 }
 
@@ -290,6 +293,7 @@ impl Heap {
             stats: HeapStats::default(),
             has_images: config.images,
             identity: Arc::default(),
+            numbered: 0,
         }
     }
 

@@ -116,9 +116,9 @@ pub(crate) fn open(heap: &mut Heap, world: &mut World, module: Arc<ModuleImage>)
     let image = Image {
         packages,
         definitions: Definitions::of(&module)?,
-        symbols: heap.alloc_vector_filled(module.symbol_count(), Value::UNSUPPLIED)?,
-        pool: heap.alloc_vector_filled(module.constant_count(), Value::UNSUPPLIED)?,
-        functions: heap.alloc_vector_filled(module.function_count(), Value::UNSUPPLIED)?,
+        symbols: trust::alloc_image_table(heap, module.symbol_count())?,
+        pool: trust::alloc_image_table(heap, module.constant_count())?,
+        functions: trust::alloc_image_table(heap, module.function_count())?,
         lazy: trust::alloc_stub(heap, Value::NIL, Value::index(number), shape, 1, LAZY_WORD)?,
         module: module.clone(),
     };
@@ -189,7 +189,7 @@ impl ImageLoader<'_> {
         }
         let function =
             trust::alloc_function(self.heap, self.image().lazy, &[Value::index(number.0 as usize)])?;
-        self.heap.vector_set(table, number.0 as usize, function);
+        self.heap.own_vector_set(table, number.0 as usize, function);
         Ok(function)
     }
 
@@ -207,7 +207,7 @@ impl ImageLoader<'_> {
             SymbolHome::Uninterned(id) => Symbol::uninterned(id, record.name),
         };
         let object = self.world.intern(self.heap, &symbol)?;
-        self.heap.vector_set(table, number as usize, object);
+        self.heap.own_vector_set(table, number as usize, object);
         Ok(object)
     }
 
@@ -239,7 +239,7 @@ impl ImageLoader<'_> {
                 continue;
             }
             let value = self.make(record, table)?;
-            self.heap.vector_set(table, next.0 as usize, value);
+            self.heap.own_vector_set(table, next.0 as usize, value);
             under_way.pop();
         }
         Ok(self.made(table, index.0).unwrap_or(Value::NIL))
@@ -301,7 +301,7 @@ impl ImageLoader<'_> {
                     Some(code) => code,
                     None => {
                         let code = self.start(&module, inner)?;
-                        self.heap.vector_set(table, inner.0 as usize, code);
+                        self.heap.own_vector_set(table, inner.0 as usize, code);
                         to_fill.push((inner, code));
                         code
                     }
