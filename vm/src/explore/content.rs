@@ -1,13 +1,14 @@
 //! The content of a state, as the fingerprint visits it: a method for each field that the list of all state
 //! calls content.
 
-use super::fingerprint::{Walk, sort_of};
+use super::fingerprint::{NamedSymbol, Walk};
 use crate::compiler::Compilations;
+use crate::heap::Heap;
 use crate::heap::layout::SymbolObject;
 use crate::interp::frames::entry_word;
 use crate::outside::Outside;
 use crate::schedule::{Due, Scheduler};
-use crate::shape::Sort;
+use crate::shape::{Shape, Sort};
 use crate::state::{
     VisitCompiler, VisitControl, VisitCourse, VisitExtra, VisitOutside, VisitRunning, VisitScheduler,
     VisitTask, VisitVm, VisitWorld,
@@ -17,7 +18,6 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
 use crate::world::World;
-use crate::world::load::image_origin;
 
 impl VisitVm for Walk<'_> {
     fn scheduler(&mut self, vm: &Vm) {
@@ -36,7 +36,12 @@ impl VisitVm for Walk<'_> {
         }
         vm.database.visit_state(&mut |item| match item {
             Ok(word) => self.word(word),
-            Err(v) => self.value(v),
+            Err(v) => {
+                if !self.is_strict {
+                    self.no_value();
+                }
+                self.value(v);
+            }
         });
     }
 
@@ -224,12 +229,11 @@ impl VisitWorld for Walk<'_> {
     /// What symbols of packages have that is not the language's from the beginning.
     fn symbols(&mut self, _: &World) {
         let vm = self.vm;
-        for &(digest, v) in &*self.named() {
+        for &NamedSymbol { digest, object: v, .. } in &*self.named() {
             let Some(object) = vm.heap.symbol(v) else { continue };
             let has_value = object.value != Value::UNBOUND
                 && object.header.flags & (SymbolObject::CONSTANT | SymbolObject::KEYWORD) == 0;
-            let has_function = image_origin(&vm.heap, object.function).is_none()
-                && sort_of(&vm.heap, object.function) == Some(Sort::Bytecode);
+            let has_function = is_of_program(&vm.heap, object.function);
             if !has_value && !has_function && !object.plist.is_true() {
                 continue;
             }
@@ -243,6 +247,15 @@ impl VisitWorld for Walk<'_> {
             self.value(object.plist);
         }
     }
+}
+
+/// Returns whether a function has code that is not the library's.
+fn is_of_program(heap: &Heap, function: Value) -> bool {
+    let code = heap.function_code(function).and_then(|code| heap.code(code));
+    code.is_some_and(|code| {
+        let is_of_image = code.owner.as_index().is_some() && code.debug.as_index().is_some();
+        !is_of_image && Shape::unpack(code.spare[0]).sort == Sort::Bytecode
+    })
 }
 
 impl VisitCompiler for Walk<'_> {

@@ -16,15 +16,16 @@
 //! runs that agree in it go on alike to the tick, and it says so of a run and its replay, in other processes
 //! too.
 
-use std::collections::HashMap;
 use std::rc::Rc;
+use std::sync::Arc;
 
+use super::digest::Digest;
 use super::live::Live;
+use super::numbers::ObjectNumbers;
 use esl_bytecode::symbol::Symbol;
 use esl_heap::state::{StateSink, Stated};
 
 use crate::fused::unfused;
-use crate::heap::layout::GRANULE;
 use crate::heap::{Heap, Kind};
 use crate::interp::frames::Frames;
 use crate::shape::{Shape, Sort};
@@ -32,88 +33,19 @@ use crate::shared::CopyOnWrite;
 use crate::state::{VisitCourse, VisitVm};
 use crate::table::Table;
 use crate::task::{Task, TaskEnd, UnwindTarget, Unwinding};
-use crate::value::Value;
+use crate::value::{TAG_MASK, TAG_OBJECT, Value};
 use crate::vm::Vm;
 use crate::wait::{event, link};
 use crate::world::load::image_origin;
 use crate::world::{GivenMap, World};
 
-/// Two hashes of 64 bits of a sequence of words, mixed apart from each other.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub(super) struct Digest(u64, u64);
-
-impl Digest {
-    pub(super) fn add(&mut self, word: u64) {
-        // Each line is a bijection of the hash for a given word, and of the word for a given hash.
-        self.0 = (self.0 ^ word).wrapping_mul(0xD6E8_FEB8_6659_FD93);
-        self.0 ^= self.0 >> 32;
-        self.1 = (self.1.rotate_left(27) ^ word.rotate_left(32)).wrapping_mul(0x9FB2_1C65_1E98_DF25);
-        self.1 ^= self.1 >> 29;
-    }
-
-    pub(super) fn add_all(&mut self, words: impl ExactSizeIterator<Item = u64>) {
-        self.add(words.len() as u64);
-        words.for_each(|word| self.add(word));
-    }
-
-    pub(super) fn add_text(&mut self, text: &str) {
-        self.add_all(text.bytes().map(u64::from));
-    }
-
-    /// Returns what tells a symbol of a package from others.
-    fn of_symbol(symbol: &Symbol) -> Digest {
-        let mut digest = Digest(2, 1);
-        digest.add_text(symbol.package().map_or("", |package| package));
-        digest.add_text(symbol.name());
-        digest
-    }
-
-    fn bits(self) -> u128 {
-        u128::from(self.0) << 64 | u128::from(self.1)
-    }
-}
-
-/// The numbers of the objects that a walk has met.
-#[derive(Default)]
-struct ObjectNumbers {
-    /// Ordinal of the walk.
-    walk: u32,
-    /// For a place in the heap the ordinal of the walk that has met an object there last, above its number.
-    by_place: Vec<u64>,
-    /// Numbers of the objects at other places, by identity.
-    others: GivenMap<u64, u32>,
-}
-
-/// Number of places that are looked up in a table.
-const PLACES: u64 = 1 << 22;
-
-impl ObjectNumbers {
-    /// Begins another walk.
-    fn begin(&mut self) {
-        self.others.clear();
-        self.walk = self.walk.wrapping_add(1);
-        if self.walk == 0 {
-            (self.by_place, self.walk) = (Vec::new(), 1);
-        }
-    }
-
-    /// Returns the number of the object with this identity: `next`, if it is met for the first time.
-    fn of(&mut self, identity: u64, next: u32) -> u32 {
-        // No two objects share a granule.
-        let place = identity / GRANULE as u64;
-        if place >= PLACES {
-            return *self.others.entry(identity).or_insert(next);
-        }
-        let place = place as usize;
-        if place >= self.by_place.len() {
-            self.by_place.resize((place + 1).next_multiple_of(1 << 12), 0);
-        }
-        let entry = &mut self.by_place[place];
-        if (*entry >> 32) as u32 != self.walk {
-            *entry = u64::from(self.walk) << 32 | u64::from(next);
-        }
-        *entry as u32
-    }
+/// A symbol of a package, and what tells it from others.
+#[derive(Clone)]
+pub(super) struct NamedSymbol {
+    symbol: Symbol,
+    pub(super) digest: Digest,
+    /// The object.
+    pub(super) object: Value,
 }
 
 /// Makes fingerprints, and remembers of functions what does not change.
@@ -122,44 +54,83 @@ pub(super) struct Fingerprints {
     /// What tells the code of a function from others, and a symbol of a package, by its address in the
     /// present machine.
     codes: CopyOnWrite<GivenMap<u64, Digest>>,
-    /// The symbols of packages, by name, and what tells each from others.
-    named: Rc<Vec<(Digest, Value)>>,
+    /// The symbols of packages that are objects, by name.
+    named: Rc<Vec<NamedSymbol>>,
+    /// Number of all symbols of packages at that time.
+    named_of: usize,
     /// The collector's cycle in which the addresses are good.
     cycle: u64,
     /// Which registers are live, by what tells the code.
-    live: CopyOnWrite<HashMap<Digest, Rc<Live>>>,
+    live: CopyOnWrite<GivenMap<Digest, Rc<Live>>>,
     numbers: ObjectNumbers,
+    /// Room for the objects that a walk meets.
+    met: Vec<Value>,
+}
+
+impl NamedSymbol {
+    fn name(&self) -> (Option<&Arc<str>>, &str) {
+        (self.symbol.package(), self.symbol.name())
+    }
+}
+
+/// What is remembered of a machine as it stood.
+pub(super) struct MachineMemory {
+    codes: CopyOnWrite<GivenMap<u64, Digest>>,
+    named: Rc<Vec<NamedSymbol>>,
+    named_of: usize,
+    cycle: u64,
 }
 
 impl Fingerprints {
     /// Another machine comes, with other addresses.
     pub(super) fn begin_machine(&mut self) {
         self.codes = CopyOnWrite::default();
-        self.named = Rc::default();
+        (self.named, self.named_of) = (Rc::default(), 0);
     }
 
     /// Returns a copy of what is remembered of the present machine, as it stands.
-    pub(super) fn of_machine(&self) -> Fingerprints {
+    pub(super) fn of_machine(&self) -> MachineMemory {
         let (codes, named) = (self.codes.clone(), self.named.clone());
-        Fingerprints { codes, named, cycle: self.cycle, ..Fingerprints::default() }
+        MachineMemory { codes, named, named_of: self.named_of, cycle: self.cycle }
     }
 
     /// Returns to what was remembered at the time of such a copy, with the machine.
-    pub(super) fn restore(&mut self, copy: &Fingerprints) {
-        (self.codes, self.named, self.cycle) = (copy.codes.clone(), copy.named.clone(), copy.cycle);
+    pub(super) fn restore(&mut self, copy: &MachineMemory) {
+        (self.codes, self.named) = (copy.codes.clone(), copy.named.clone());
+        (self.named_of, self.cycle) = (copy.named_of, copy.cycle);
     }
 
-    /// Returns the symbols of packages, by name, and what tells each from others.
-    pub(super) fn named(&mut self, world: &World) -> Rc<Vec<(Digest, Value)>> {
+    /// Takes note of the symbols that the machine has got since.
+    fn note_symbols(&mut self, world: &World) {
         // A machine gets more symbols, and loses none.
-        if self.named.len() != world.symbols.len() {
-            let mut all: Vec<(&Symbol, Value)> = Vec::with_capacity(world.symbols.len());
-            all.extend(world.symbols.iter().map(|(symbol, &value)| (symbol, value)));
-            all.sort_unstable_by(|(a, _), (b, _)| (a.package(), a.name()).cmp(&(b.package(), b.name())));
-            self.named =
-                Rc::new(all.into_iter().map(|(symbol, value)| (Digest::of_symbol(symbol), value)).collect());
+        if self.named_of == world.symbols.len() {
+            return;
         }
-        self.named.clone()
+        self.numbers.begin();
+        for named in &*self.named {
+            self.numbers.of(named.object, 0);
+        }
+        let numbers = &mut self.numbers;
+        let mut is_new = |object: Value| object.is_address() && numbers.of(object, 1) == 1;
+        let new = world.symbols.iter().filter(|&(_, &object)| is_new(object));
+        let mut new: Vec<NamedSymbol> = new
+            .map(|(symbol, &object)| NamedSymbol {
+                symbol: symbol.clone(),
+                digest: Digest::of_symbol(symbol),
+                object,
+            })
+            .collect();
+        new.sort_unstable_by(|a, b| a.name().cmp(&b.name()));
+        let mut all = Vec::with_capacity(self.named.len() + new.len());
+        let mut old = self.named.iter().peekable();
+        for symbol in new {
+            while let Some(before) = old.next_if(|old| old.name() < symbol.name()) {
+                all.push(before.clone());
+            }
+            all.push(symbol);
+        }
+        all.extend(old.cloned());
+        (self.named, self.named_of) = (Rc::new(all), world.symbols.len());
     }
 
     /// Returns the fingerprint of the state of a machine in which no task runs.
@@ -173,23 +144,20 @@ impl Fingerprints {
     }
 
     fn walk(&mut self, vm: &Vm, now: u64, is_strict: bool) -> u128 {
+        self.note_symbols(&vm.world);
         self.numbers.begin();
-        let mut walk = Walk {
-            vm,
-            known: self,
-            digest: Digest::default(),
-            met: Vec::with_capacity(1 << 10),
-            next: 0,
-            now,
-            task: None,
-            is_strict,
-        };
+        let mut met = std::mem::take(&mut self.met);
+        met.clear();
+        let mut walk =
+            Walk { vm, known: self, digest: Digest::default(), met, next: 0, now, task: None, is_strict };
         walk.machine(walk.vm);
         while let Some(&object) = walk.met.get(walk.next) {
             walk.next += 1;
             walk.object(object);
         }
-        walk.digest.bits()
+        let Walk { digest, met, .. } = walk;
+        self.met = met;
+        digest.bits()
     }
 }
 
@@ -256,21 +224,45 @@ impl Walk<'_> {
 
     /// A value: the word that it is, or the number of the object.
     pub(super) fn value(&mut self, v: Value) {
+        if self.is_strict {
+            return self.strict_value(v);
+        }
+        if !v.is_address() {
+            return self.word(v.bits());
+        }
+        // What has the tag of a cons or an object is no other word.
+        let number = self.number(v);
+        self.word(u64::from(number) << TAG_MASK.count_ones() | v.bits() & TAG_MASK);
+    }
+
+    /// Something that is no value, in the place of one: a word of which nothing else begins there.
+    pub(super) fn no_value(&mut self) {
+        // No object has this number.
+        self.word(u64::MAX << TAG_MASK.count_ones() | TAG_OBJECT);
+    }
+
+    fn strict_value(&mut self, v: Value) {
         if !v.is_address() {
             self.word(0);
             return self.word(v.bits());
         }
-        let next = self.met.len() as u32;
-        let identity = self.vm.heap.identity(v);
-        let number = self.known.numbers.of(identity, next);
-        if number == next {
-            self.met.push(v);
-            if self.is_strict {
-                self.word(identity);
-            }
+        let known = self.met.len();
+        let number = self.number(v);
+        if known < self.met.len() {
+            self.word(self.vm.heap.identity(v));
         }
         self.word(1);
         self.word(u64::from(number));
+    }
+
+    /// Returns the number of an object, which is to be looked into if it is met for the first time.
+    fn number(&mut self, v: Value) -> u32 {
+        let next = self.met.len() as u32;
+        let number = self.known.numbers.of(v, next);
+        if number == next {
+            self.met.push(v);
+        }
+        number
     }
 
     pub(super) fn values(&mut self, values: &[Value]) {
@@ -306,7 +298,7 @@ impl Walk<'_> {
                 if registers.contains(register) || self.is_strict && v.is_address() {
                     self.word(register as u64);
                     if self.is_return_address(v) {
-                        self.word(2);
+                        if self.is_strict { self.word(2) } else { self.no_value() }
                     } else {
                         self.value(v);
                     }
@@ -388,7 +380,12 @@ impl Walk<'_> {
             Kind::Wait => {
                 for (index, &v) in vm.heap.record(v, Kind::Wait).unwrap_or_default().iter().enumerate() {
                     match v.as_index() {
-                        Some(time) if index == link::DEADLINE => self.time(time as u64),
+                        Some(time) if index == link::DEADLINE => {
+                            if !self.is_strict {
+                                self.no_value();
+                            }
+                            self.time(time as u64);
+                        }
                         _ => self.value(v),
                     }
                 }
@@ -421,15 +418,19 @@ impl Walk<'_> {
         Some(digest)
     }
 
-    /// What the machine knows of its symbols, by name.
-    pub(super) fn named(&mut self) -> Rc<Vec<(Digest, Value)>> {
-        self.known.named(&self.vm.world)
+    /// The symbols of packages, by name.
+    pub(super) fn named(&self) -> Rc<Vec<NamedSymbol>> {
+        self.known.named.clone()
     }
 
     /// An object without values in it.
     fn raw(&mut self, v: Value) {
         let heap = &self.vm.heap;
-        if let Some(characters) = heap.string(v) {
+        if let Some(numbers) = heap.string(v).or_else(|| heap.words(v)).filter(|_| !self.is_strict) {
+            self.digest.add_numbers(numbers);
+        } else if let Some(bytes) = heap.bytes(v).filter(|_| !self.is_strict) {
+            self.digest.add_bytes(bytes);
+        } else if let Some(characters) = heap.string(v) {
             self.digest.add_all(characters.iter().map(|&c| u64::from(c)));
         } else if let Some(words) = heap.words(v) {
             self.digest.add_all(words.iter().map(|&word| u64::from(word)));

@@ -8,7 +8,7 @@ use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
 
 use super::Settings;
-use super::fingerprint::Fingerprints;
+use super::fingerprint::{Fingerprints, MachineMemory};
 use super::point::{PointRun, explore_by};
 use super::search::{ROOT, Search};
 use crate::snapshot::Snapshot;
@@ -21,7 +21,7 @@ const FEW: usize = 8;
 struct KeptPlace {
     snapshot: Snapshot,
     run: PointRun,
-    fingerprints: Fingerprints,
+    fingerprints: MachineMemory,
     /// Bytes that it takes beside the image of the heap.
     bytes: usize,
 }

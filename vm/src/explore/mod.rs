@@ -4,6 +4,7 @@
 //! ```text
 //! point         where a task may have to let others go first, and running from point to point
 //! fingerprint   telling states apart           content  visiting the fields that belong to a state
+//! digest        hashes of states               numbers  objects in the order in which they are met
 //! live          which registers of a frame belong to a state
 //! search        the tree of choices, and the states found
 //! trace         one run of the search, and taking in what it has come by
@@ -49,10 +50,12 @@
 
 mod content;
 mod crew;
+mod digest;
 mod fingerprint;
 mod keep;
 mod live;
 mod livelock;
+mod numbers;
 mod point;
 mod search;
 #[cfg(test)]
