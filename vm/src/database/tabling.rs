@@ -167,10 +167,12 @@ impl Query {
             choices.pop();
             return;
         }
-        for (&variable, &value) in variables.iter().zip(answers.get(*at)) {
-            bindings[variable as usize] = value;
-            bound.push(variable);
+        let answer = answers.get(*at);
+        // An answer has a value for each of the variables.
+        for (position, &variable) in variables.iter().enumerate() {
+            bindings[variable as usize] = answer[position];
         }
+        bound.extend_from_slice(variables);
         let (rank, key, next) = (*rank, *at as u64, *next);
         *at += 1;
         self.set_key(rank, key);
