@@ -1,7 +1,7 @@
 //! What ESL programs can do without Rust: modules over the operating system.
 //!
-//! Whatever the system may delay is an operation, done on one event loop in its own thread: only the task that
-//! has asked for it waits. The operations are the small part of a module that is in Rust; the rest is in
+//! Whatever the system may delay is an operation, done on one event loop in its own thread: only the task
+//! that has asked for it waits. The operations are the small part of a module that is in Rust; the rest is in
 //! ESL, in `modules/`.
 //!
 //! Guarantees: each operation names the right that it needs, which is asked for before it begins. What a

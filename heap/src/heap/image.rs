@@ -452,7 +452,7 @@ mod tests {
             assert!(unsafe { heap.restore(&images[image]) });
             assert_eq!((at(&heap, 0), at(&heap, 5000)), (first, other));
             heap.own_vector_set(vector, 7, Value::T).expect("it has the element");
-            // SAFETY: as above.
+            // SAFETY: the vector is older than the images.
             assert!(unsafe { heap.restore(&images[image]) });
             assert_eq!((at(&heap, 0), at(&heap, 5000), at(&heap, 7)), (first, other, none));
         }

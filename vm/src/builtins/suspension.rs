@@ -137,7 +137,7 @@ pub(super) fn tree_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 /// The first tasks of a list, as many as a builtin sees to at once.
-struct Listed {
+struct ListedTasks {
     objects: Vec<Value>,
     /// Their places; [`TaskIndex::NONE`] for those that have ended.
     places: Vec<TaskIndex>,
@@ -145,9 +145,9 @@ struct Listed {
     rest: Value,
 }
 
-impl Listed {
+impl ListedTasks {
     /// Returns the first tasks of `list`, up to the cell `end`.
-    fn new(heap: &Heap, list: Value, end: Value) -> Listed {
+    fn new(heap: &Heap, list: Value, end: Value) -> ListedTasks {
         let mut objects = Vec::with_capacity(LIMIT);
         let mut rest = list;
         while objects.len() < LIMIT
@@ -159,7 +159,7 @@ impl Listed {
         }
         let place = |&object: &Value| event::task_index(heap, object).unwrap_or(TaskIndex::NONE);
         let places = objects.iter().map(place).collect();
-        Listed { objects, places, rest }
+        ListedTasks { objects, places, rest }
     }
 
     /// Returns the places of those that are or can be at rest, and the others.
@@ -179,7 +179,7 @@ impl Listed {
 pub(super) fn begin_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let [tasks, stops_clock] = exactly(arguments);
-    let tasks = Listed::new(&vm.heap, tasks, Value::NIL);
+    let tasks = ListedTasks::new(&vm.heap, tasks, Value::NIL);
     let (resting, others) = tasks.divide(|place| run::can_rest(vm, place));
     let others = vm.heap.list(&others)?;
     vm.exchange.charge(64 * resting.len());
@@ -191,7 +191,7 @@ pub(super) fn begin_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn resume_from_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let [tasks, end] = exactly(arguments);
-    let tasks = Listed::new(&vm.heap, tasks, end);
+    let tasks = ListedTasks::new(&vm.heap, tasks, end);
     let (resting, others) = tasks.divide(|place| vm.scheduler.tasks.rest(place) != Rest::None);
     let others = vm.heap.list(&others)?;
     vm.exchange.charge(64 * resting.len());

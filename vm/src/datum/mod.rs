@@ -470,13 +470,11 @@ fn is_equivalent(a: &Datum, b: &Datum) -> bool {
 pub(crate) fn export(heap: &Heap, world: &World, value: Value) -> Result<(Datum, usize), DatumError> {
     let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
     // An atom shares nothing with other parts, so it needs neither walk nor memory.
-    if parts_of(heap, value).is_none()
-        && let Some(kind) = unit.atom_kind(heap, world, value)
-    {
+    let is_atom = parts_of(heap, value).is_none();
+    if let Some(kind) = is_atom.then(|| unit.atom_kind(heap, world, value)).flatten() {
         return Ok((Datum::of_kind(kind, Span::default()), 1));
     }
-    let datum = unit.datum_of(heap, world, value, Span::default())?;
-    Ok((datum, unit.take_work() as usize))
+    Ok((unit.datum_of(heap, world, value, Span::default())?, unit.take_work() as usize))
 }
 
 /// Returns data as a value, and the work that it took.
@@ -488,7 +486,6 @@ pub(crate) fn import(
     world: &mut World,
     datum: &Datum,
 ) -> Result<(Value, usize), AllocError> {
-    // As in `export`.
     if let DatumKind::String(text) = datum.kind() {
         return Ok((heap.alloc_str(text)?, 1));
     }
@@ -496,8 +493,7 @@ pub(crate) fn import(
     if !datum.is_compound() {
         return Ok((unit.atom_value(heap, world, datum)?, 1));
     }
-    let value = unit.value_of(heap, world, datum)?;
-    Ok((value, unit.take_work() as usize))
+    Ok((unit.value_of(heap, world, datum)?, unit.take_work() as usize))
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Livelocks: fair cycles of the graph of states, which a run may follow for ever.
 //!
 //! A cycle is fair if each task that could go on at each of its states goes on at one of them, if time passes
-//! where a timer runs at each of them, and if each alternative of a `choose` is taken. The search goes through
-//! the strongly connected components of the graph, without the states at which an alternative leaves the
-//! component: a component has a fair cycle exactly if the cycle through all of it is fair.
+//! where a timer runs at each of them, and if each alternative of a `choose` is taken. The search goes
+//! through the strongly connected components of the graph, without the states at which an alternative leaves
+//! the component: a component has a fair cycle exactly if the cycle through all of it is fair.
 //!
 //! A task is identified by its rank among the tasks that exist. A step that changes which tasks exist belongs
 //! to no cycle, and neither does a step among more than 63 tasks.
