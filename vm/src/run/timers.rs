@@ -20,9 +20,13 @@ const VIRTUAL_TICKS: u64 = 10_000_000;
 /// Timers that fire in one step; between two steps tasks have their turns.
 const AT_ONCE: usize = 1000;
 
-/// Asks the clock if it is time to, and fires the timers that are due.
+/// Asks the clock if it is time to, and fires the timers that are due. Where many timers are no longer
+/// wanted, drops them: while tasks run, none may fire for long.
 #[inline(always)]
 pub(super) fn look_at_clock(vm: &mut Vm) {
+    if vm.scheduler.timers.wants_sweep() {
+        vm.scheduler.sweep_timers();
+    }
     let Scheduler { timers, clock, spent, .. } = &vm.scheduler;
     let wait = if clock.is_virtual { VIRTUAL_TICKS } else { CLOCK_TICKS };
     let since = if clock.is_virtual { clock.moved_at } else { clock.looked_at };
@@ -79,9 +83,6 @@ fn fire_timers(vm: &mut Vm) {
     let scheduler = &mut vm.scheduler;
     scheduler.clock.more_is_due = left == 0;
     scheduler.clock.moved_at = scheduler.spent;
-    if scheduler.timers.wants_sweep() {
-        scheduler.sweep_timers();
-    }
 }
 
 /// Fires timers that are due while all tasks wait, and looks whether input has come, without waiting. Where

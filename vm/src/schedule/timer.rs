@@ -74,6 +74,7 @@ impl Timers {
         let timers = std::mem::take(&mut self.heap).into_vec();
         self.heap = timers.into_iter().filter(|&Reverse(timer)| is_wanted(timer)).collect();
         self.sweep_at = self.heap.len() * 2;
+        self.heap.shrink_to(self.sweep_at);
     }
 
     /// Returns all timers, in the order in which they fire.
