@@ -67,3 +67,30 @@ fn programs_end_as_with_switches_at_all_ticks() {
         }
     }
 }
+
+// ---- what the library gives symbols
+
+#[test]
+fn documentation_and_functions_that_a_program_changes_belong_to_a_state() {
+    // All tasks stand alike in both ways; what differs is a property of a symbol of the library.
+    check(
+        "(spawn
+           (progn
+             (choose nil (setf (documentation '*random-state* 'variable) \"changed\"))
+             (sleep 0)
+             (princ (if (equal (documentation '*random-state* 'variable) \"changed\") 'changed 'kept))))",
+        Grain::Changes,
+        &["CHANGED", "KEPT"],
+    );
+    check(
+        "(defun before () 'kept)
+         (spawn
+           (progn
+             (before)
+             (choose nil (setf (symbol-function 'before) (lambda () 'changed)))
+             (sleep 0)
+             (princ (before))))",
+        Grain::Changes,
+        &["CHANGED", "KEPT"],
+    );
+}

@@ -229,11 +229,11 @@ impl VisitWorld for Walk<'_> {
     /// What symbols of packages have that is not the language's from the beginning.
     fn symbols(&mut self, _: &World) {
         let vm = self.vm;
-        for &NamedSymbol { digest, object: v, .. } in &*self.named() {
+        for &NamedSymbol { digest, object: v, function, .. } in &*self.named() {
             let Some(object) = vm.heap.symbol(v) else { continue };
             let has_value = object.value != Value::UNBOUND
                 && object.header.flags & (SymbolObject::CONSTANT | SymbolObject::KEYWORD) == 0;
-            let has_function = is_of_program(&vm.heap, object.function);
+            let has_function = object.function != function && is_of_program(&vm.heap, object.function);
             if !has_value && !has_function && !object.plist.is_true() {
                 continue;
             }
@@ -250,7 +250,7 @@ impl VisitWorld for Walk<'_> {
 }
 
 /// Returns whether a function has code that is not the library's.
-fn is_of_program(heap: &Heap, function: Value) -> bool {
+pub(super) fn is_of_program(heap: &Heap, function: Value) -> bool {
     let code = heap.function_code(function).and_then(|code| heap.code(code));
     code.is_some_and(|code| {
         let is_of_image = code.owner.as_index().is_some() && code.debug.as_index().is_some();

@@ -19,6 +19,7 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
+use super::content::is_of_program;
 use super::digest::Digest;
 use super::live::Live;
 use super::numbers::ObjectNumbers;
@@ -46,6 +47,10 @@ pub(super) struct NamedSymbol {
     pub(super) digest: Digest,
     /// The object.
     pub(super) object: Value,
+    /// The function of the library that it had when it was noted; `NIL` if it had none.
+    pub(super) function: Value,
+    /// The documentation that it has from the library; `NIL` if it has none.
+    documentation: Value,
 }
 
 /// Makes fingerprints, and remembers of functions what does not change.
@@ -68,6 +73,23 @@ pub(super) struct Fingerprints {
 }
 
 impl NamedSymbol {
+    fn of(heap: &Heap, world: &World, symbol: &Symbol, object: Value) -> NamedSymbol {
+        let cells = heap.symbol(object);
+        let function = cells.map(|cells| cells.function);
+        let function = function.filter(|&function| !is_of_program(heap, function)).unwrap_or(Value::NIL);
+        let documentation = cells
+            .filter(|cells| cells.plist.is_true())
+            .and_then(|_| world.images.text_of(heap, symbol))
+            .unwrap_or(Value::NIL);
+        NamedSymbol {
+            symbol: symbol.clone(),
+            digest: Digest::of_symbol(symbol),
+            object,
+            function,
+            documentation,
+        }
+    }
+
     fn name(&self) -> (Option<&Arc<str>>, &str) {
         (self.symbol.package(), self.symbol.name())
     }
@@ -82,7 +104,7 @@ pub(super) struct MachineMemory {
 }
 
 impl Fingerprints {
-    /// Another machine comes, with other addresses.
+    /// Another machine comes, or another cycle of the collector, with other addresses.
     pub(super) fn begin_machine(&mut self) {
         self.codes = CopyOnWrite::default();
         (self.named, self.named_of) = (Rc::default(), 0);
@@ -101,7 +123,7 @@ impl Fingerprints {
     }
 
     /// Takes note of the symbols that the machine has got since.
-    fn note_symbols(&mut self, world: &World) {
+    fn note_symbols(&mut self, heap: &Heap, world: &World) {
         // A machine gets more symbols, and loses none.
         if self.named_of == world.symbols.len() {
             return;
@@ -113,13 +135,8 @@ impl Fingerprints {
         let numbers = &mut self.numbers;
         let mut is_new = |object: Value| object.is_address() && numbers.of(object, 1) == 1;
         let new = world.symbols.iter().filter(|&(_, &object)| is_new(object));
-        let mut new: Vec<NamedSymbol> = new
-            .map(|(symbol, &object)| NamedSymbol {
-                symbol: symbol.clone(),
-                digest: Digest::of_symbol(symbol),
-                object,
-            })
-            .collect();
+        let mut new: Vec<NamedSymbol> =
+            new.map(|(symbol, &object)| NamedSymbol::of(heap, world, symbol, object)).collect();
         new.sort_unstable_by(|a, b| a.name().cmp(&b.name()));
         let mut all = Vec::with_capacity(self.named.len() + new.len());
         let mut old = self.named.iter().peekable();
@@ -133,19 +150,32 @@ impl Fingerprints {
         (self.named, self.named_of) = (Rc::new(all), world.symbols.len());
     }
 
+    /// Gives the documentation of the library numbers that follow from the names of its symbols. It need not
+    /// be looked into.
+    fn number_documentation(&mut self) {
+        for NamedSymbol { digest, documentation, .. } in &*self.named {
+            if documentation.is_address() {
+                self.numbers.of(*documentation, 1 << 31 | digest.0 as u32);
+            }
+        }
+    }
+
     /// Returns the fingerprint of the state of a machine in which no task runs.
     pub(super) fn of(&mut self, vm: &mut Vm) -> u128 {
         if self.cycle != vm.heap.cycle_id() {
             self.cycle = vm.heap.cycle_id();
-            self.codes = CopyOnWrite::default();
+            self.begin_machine();
         }
         let now = vm.scheduler.clock.read(&mut vm.outside.host);
         self.walk(vm, now, false)
     }
 
     fn walk(&mut self, vm: &Vm, now: u64, is_strict: bool) -> u128 {
-        self.note_symbols(&vm.world);
+        self.note_symbols(&vm.heap, &vm.world);
         self.numbers.begin();
+        if !is_strict {
+            self.number_documentation();
+        }
         let mut met = std::mem::take(&mut self.met);
         met.clear();
         let mut walk =

@@ -69,6 +69,15 @@ impl Images {
         self.0.iter().enumerate().find_map(find)
     }
 
+    /// Returns the first text among the properties that an image gives a symbol: its documentation. `None` if
+    /// there is none, or the symbol has no object yet.
+    pub(crate) fn text_of(&self, heap: &Heap, symbol: &Symbol) -> Option<Value> {
+        let (image, definition) = self.definition(symbol)?;
+        let pool = heap.vector(self.0.get(image)?.pool)?;
+        let values = definition.properties.iter().filter_map(|(_, value)| pool.get(value.0 as usize));
+        values.copied().find(|&value| heap.string(value).is_some())
+    }
+
     /// Returns the names that the newest image exports from `ESL`.
     pub(crate) fn exports(&self) -> Vec<String> {
         let names = self.0.last().map(|image| image.definitions.exports(&image.module, &image.packages));
@@ -288,10 +297,10 @@ impl ImageLoader<'_> {
     /// made ready with it, and those inside them.
     fn code(&mut self, number: FunctionNumber) -> Result<Value, LoadError> {
         let module = self.module();
-        let first = self.start(&module, number)?;
-        let mut to_fill = vec![(number, first)];
-        while let Some((number, code)) = to_fill.pop() {
-            for (index, constant) in module.function(number)?.constants.into_iter().enumerate() {
+        let (first, constants) = self.start(&module, number)?;
+        let mut to_fill = vec![(first, constants)];
+        while let Some((code, constants)) = to_fill.pop() {
+            for (index, constant) in constants.into_iter().enumerate() {
                 let ConstantRecord::Function(inner) = module.constant(constant)? else { continue };
                 if module.capture_count(inner)? == 0 {
                     continue;
@@ -300,9 +309,9 @@ impl ImageLoader<'_> {
                 let inner_code = match self.made(table, inner.0) {
                     Some(code) => code,
                     None => {
-                        let code = self.start(&module, inner)?;
+                        let (code, constants) = self.start(&module, inner)?;
                         self.heap.own_vector_set(table, inner.0 as usize, code);
-                        to_fill.push((inner, code));
+                        to_fill.push((code, constants));
                         code
                     }
                 };
@@ -312,8 +321,12 @@ impl ImageLoader<'_> {
         Ok(first)
     }
 
-    /// Makes a Code whose constants still lack functions with captures.
-    fn start(&mut self, module: &ModuleImage, number: FunctionNumber) -> Result<Value, LoadError> {
+    /// Makes a Code whose constants still lack functions with captures. Returns it and its constants.
+    fn start(
+        &mut self,
+        module: &ModuleImage,
+        number: FunctionNumber,
+    ) -> Result<(Value, Vec<PoolIdx>), LoadError> {
         let function = module.function(number)?;
         let mut missing = None;
         let constants = own_constants(&function, |index| {
@@ -339,7 +352,8 @@ impl ImageLoader<'_> {
         };
         let debug = Value::index(number.0 as usize);
         let parts = LoadedFunction { function: &function, constants: &constants, name, debug };
-        Ok(make_code(self.heap, &Verified::image(), &parts, Value::index(self.image))?)
+        let code = make_code(self.heap, &Verified::image(), &parts, Value::index(self.image))?;
+        Ok((code, function.constants))
     }
 }
 
