@@ -196,7 +196,7 @@ fn fill(start: NonNull<Value>, from: usize, to: usize) {
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST, PAGES, Stack, segment};
+    use super::{Stack, segment};
     use crate::value::Value;
 
     #[test]
@@ -253,6 +253,7 @@ mod tests {
     #[test]
     #[cfg(not(miri))]
     fn a_large_stack_grows_and_shrinks_by_steps() {
+        use super::{MOST, PAGES};
         let mut stack = Stack::new(4 * MOST);
         assert!(stack.larger(0) < 5 * MOST + 2 * PAGES);
         stack.shrink(3);
