@@ -272,7 +272,9 @@ fn a_thousand_connections_are_served_by_one_program() {
 }
 
 /// Has a peer do something with a connection, and returns its port.
-fn peer(what: impl FnOnce(TcpStream) + Send + 'static) -> (u16, std::thread::JoinHandle<()>) {
+fn peer<T: Send + 'static>(
+    what: impl FnOnce(TcpStream) -> T + Send + 'static,
+) -> (u16, std::thread::JoinHandle<T>) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
     let port = listener.local_addr().expect("it has an address").port();
     (port, std::thread::spawn(move || what(listener.accept().expect("somebody connects").0)))
@@ -405,4 +407,33 @@ fn bytes_and_text_take_turns_on_a_connection() {
     (print (handler-case (write-byte 256 c) (type-error () 'refused)))))";
     let expected = ["(\"sïze 300\" 300)", "T", "(254 \"ënd\" 1 195 2)", "(:END 2)", "REFUSED"];
     check("sockets-bytes", text, &["--allow-net=127.0.0.1"], &expected);
+}
+
+#[test]
+fn texts_of_several_tasks_are_not_mixed_when_the_peer_is_slow() {
+    let (port, peer) = peer(|stream| {
+        // The system has room for a part of what is sent only.
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        let mut counts = [0; 8];
+        for line in BufReader::new(stream).lines() {
+            let line = line.expect("it is text");
+            let digit = line.as_bytes()[0];
+            assert!(line.bytes().all(|byte| byte == digit), "a line has parts of several");
+            assert_eq!(line.len(), 50_000);
+            counts[usize::from(digit - b'0')] += 1;
+        }
+        counts
+    });
+    let text = format!(
+        "(require :sockets)
+(sockets:with-socket (c (sockets:connect \"127.0.0.1\" {port}))
+  (let ((number (sockets::number-of c)))
+    (mapc #'wait-for-task
+          (loop for i below 8
+                collect (let ((line (format nil \"~a~%\" (make-string 50000 :initial-element (digit-char i)))))
+                          (spawn (dotimes (i 40) (sockets::send number line nil))))))
+    (print 'sent)))"
+    );
+    check("sockets-mixed", &text, &["--allow-net", "--slice", "1"], &["SENT"]);
+    assert_eq!(peer.join().expect("no line is mixed"), [40; 8]);
 }

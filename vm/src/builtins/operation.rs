@@ -49,8 +49,17 @@ pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(Option<GivenInde
 
 /// Returns the function of the host that a symbol names.
 fn function_named(vm: &Vm, symbol: Value) -> Option<GivenIndex> {
-    let name = vm.heap.string_text(vm.heap.symbol(symbol)?.name)?;
-    vm.outside.function(&name)
+    let name = vm.heap.symbol(symbol)?.name;
+    let characters = vm.heap.string(name)?;
+    // Almost all names are short and ASCII, and need no memory of their own.
+    let mut bytes = [0_u8; 64];
+    if let Some(bytes) = bytes.get_mut(..characters.len())
+        && characters.iter().all(|&code| code < 0x80)
+    {
+        bytes.iter_mut().zip(characters).for_each(|(byte, &code)| *byte = code as u8);
+        return vm.outside.function(std::str::from_utf8(bytes).ok()?);
+    }
+    vm.outside.function(&vm.heap.string_text(name)?)
 }
 
 /// Returns the handle of an operation that `v` is.

@@ -23,11 +23,11 @@ use esl_bytecode::symbol::{Home, Symbol};
 
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
-use crate::world::load::{SharedObjects, array, character, integer, integer_of, ratio};
+use crate::world::load::{SharedObjects, array, character, integer, ratio};
 use crate::world::{GivenMap, GivenSet, RootMap, World};
 
 pub(crate) use walk::DatumWalk;
-use walk::{ObjectParts, parts_of};
+use walk::{ObjectParts, parts_of, plain_kind};
 
 /// Greatest number of nodes of an object that becomes a datum.
 const MAX_NODES: usize = 4_000_000;
@@ -377,32 +377,11 @@ impl Unit {
 
     /// Returns the datum that describes an atom, if there is one.
     fn atom_kind(&mut self, heap: &Heap, world: &World, object: Value) -> Option<DatumKind> {
-        if object.is_nil() {
-            return Some(DatumKind::Nil);
-        }
-        if world.is_symbol(heap, object) {
+        if world.is_symbol(heap, object) && !object.is_nil() {
             return Some(DatumKind::Symbol(self.symbol_name(heap, world, object)?));
         }
-        if let Some(n) = integer_of(heap, object) {
-            return Some(DatumKind::Integer(n));
-        }
-        if let Some((numerator, denominator)) = heap.ratio(object) {
-            return Some(DatumKind::Ratio(integer_of(heap, numerator)?, integer_of(heap, denominator)?));
-        }
-        if let Some(x) = heap.as_double(object) {
-            return Some(DatumKind::Float(x));
-        }
-        if let Some(code) = object.as_character() {
-            return Some(DatumKind::Character(char::from_u32(code)?));
-        }
-        if self.is_for_embedder
-            && let Some(opaque) = world.opaque_of(heap, object)
-        {
-            return Some(DatumKind::Opaque(opaque.clone()));
-        }
-        let is_text = heap.string(object)?.iter().all(|&code| char::from_u32(code).is_some());
-        let text = heap.string_text(object).filter(|_| is_text)?;
-        Some(DatumKind::String(text.into()))
+        let opaque = || world.opaque_of(heap, object).filter(|_| self.is_for_embedder);
+        plain_kind(heap, object).or_else(|| Some(opaque()?.kind().clone()))
     }
 
     /// As [`Unit::datum_of`]; an object that no datum can describe is represented as a whole.
@@ -468,11 +447,14 @@ fn is_equivalent(a: &Datum, b: &Datum) -> bool {
 /// # Errors
 /// [`DatumError`].
 pub(crate) fn export(heap: &Heap, world: &World, value: Value) -> Result<(Datum, usize), DatumError> {
-    let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
     // An atom shares nothing with other parts, so it needs neither walk nor memory.
-    let is_atom = parts_of(heap, value).is_none();
-    if let Some(kind) = is_atom.then(|| unit.atom_kind(heap, world, value)).flatten() {
-        return Ok((Datum::of_kind(kind, Span::default()), 1));
+    let plain = || Some(Datum::new(plain_kind(heap, value)?, Span::default()));
+    if let Some(datum) = world.opaque_of(heap, value).cloned().or_else(plain) {
+        return Ok((datum, 1));
+    }
+    let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
+    if world.is_symbol(heap, value) {
+        return Ok((unit.atom_datum(heap, world, value, Span::default()), 1));
     }
     Ok((unit.datum_of(heap, world, value, Span::default())?, unit.take_work() as usize))
 }

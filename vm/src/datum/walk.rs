@@ -7,6 +7,7 @@ use super::{DatumError, MAX_NODES, NODE_BYTES, Unit};
 use crate::heap::layout::Array;
 use crate::heap::{Heap, Kind};
 use crate::value::Value;
+use crate::world::load::integer_of;
 use crate::world::{GivenSet, RootMap, World};
 
 /// Circular literals in one form, at most.
@@ -251,4 +252,27 @@ fn visit_parts(parts: ObjectParts<'_>, steps: &mut Vec<ToDatum>) {
         ObjectParts::Pair(car, cdr) => steps.extend([ToDatum::Visit(cdr), ToDatum::Visit(car)]),
         ObjectParts::Items(_, items) => steps.extend(items.iter().rev().copied().map(ToDatum::Visit)),
     }
+}
+
+/// Returns the datum that describes an atom which neither is a symbol nor the embedder's, if there is one.
+pub(super) fn plain_kind(heap: &Heap, object: Value) -> Option<DatumKind> {
+    if object.is_nil() {
+        return Some(DatumKind::Nil);
+    }
+    if let Some(n) = integer_of(heap, object) {
+        return Some(DatumKind::Integer(n));
+    }
+    if let Some((numerator, denominator)) = heap.ratio(object) {
+        return Some(DatumKind::Ratio(integer_of(heap, numerator)?, integer_of(heap, denominator)?));
+    }
+    if let Some(x) = heap.as_double(object) {
+        return Some(DatumKind::Float(x));
+    }
+    if let Some(code) = object.as_character() {
+        return Some(DatumKind::Character(char::from_u32(code)?));
+    }
+    let characters = heap.string(object)?;
+    let is_text = characters.iter().all(|&code| code < 0x80 || char::from_u32(code).is_some());
+    let text = heap.string_text(object).filter(|_| is_text)?;
+    Some(DatumKind::String(text.into()))
 }

@@ -5,26 +5,26 @@
 //! cannot reach an object any more, the machine lets go of the thing; this happens between two instructions,
 //! at a tick that is the same in every run.
 
-use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use esl_bytecode::datum::OpaqueDatum;
+use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
+use esl_bytecode::span::Span;
 
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
-use crate::world::World;
+use crate::world::{GivenMap, World};
 
 /// The things that the program holds.
 #[derive(Clone, Default)]
 pub(crate) struct Opaques {
-    /// Objects, which this does not keep alive, and their things, by the number in the object.
-    held: BTreeMap<u64, (Value, OpaqueDatum)>,
+    /// Objects, which this does not keep alive, and the data of their things, by the number in the object.
+    held: GivenMap<u64, (Value, Datum)>,
     /// Their numbers, by the identities of the things.
-    numbers: BTreeMap<usize, u64>,
+    numbers: GivenMap<u64, u64>,
     /// Number of those made so far.
     pub(crate) made: u64,
-    /// What is to be let go.
-    unreachable: Vec<OpaqueDatum>,
+    /// What is to be let go, in the order of the numbers.
+    unreachable: Vec<Datum>,
 }
 
 /// Slots of an object; the library knows them too (`operations.esl`).
@@ -40,7 +40,7 @@ impl World {
         heap: &mut Heap,
         thing: &OpaqueDatum,
     ) -> Result<Value, AllocError> {
-        if let Some(number) = self.opaques.numbers.get(&thing.identity())
+        if let Some(number) = self.opaques.numbers.get(&(thing.identity() as u64))
             && let Some(&(object, _)) = self.opaques.held.get(number)
         {
             // From here on somebody uses it, who may have been seen already by the cycle under way.
@@ -61,16 +61,17 @@ impl World {
         let number = self.opaques.made + 1;
         let object = heap.alloc_structure(class, &[Value::index(number as usize), kind, text])?;
         self.opaques.made = number;
-        self.opaques.numbers.insert(thing.identity(), number);
-        self.opaques.held.insert(number, (object, thing.clone()));
+        self.opaques.numbers.insert(thing.identity() as u64, number);
+        let datum = Datum::new(DatumKind::Opaque(thing.clone()), Span::default());
+        self.opaques.held.insert(number, (object, datum));
         Ok(object)
     }
 
-    /// Returns the thing that an object stands for.
-    pub(crate) fn opaque_of(&self, heap: &Heap, object: Value) -> Option<&OpaqueDatum> {
+    /// Returns the datum of the thing that an object stands for.
+    pub(crate) fn opaque_of(&self, heap: &Heap, object: Value) -> Option<&Datum> {
         let number = heap.structure_slots(object)?.first()?.as_index()? as u64;
-        let (held, thing) = self.opaques.held.get(&number)?;
-        (*held == object).then_some(thing)
+        let (held, datum) = self.opaques.held.get(&number)?;
+        (*held == object).then_some(datum)
     }
 }
 
@@ -82,15 +83,16 @@ impl Opaques {
 
     /// Notes which objects the marking that is about to end has not reached.
     pub(crate) fn note_unreachable(&mut self, heap: &Heap) {
-        let Opaques { held, numbers, unreachable, .. } = self;
-        held.retain(|_, (object, thing)| {
-            let is_reached = heap.is_marked(*object);
-            if !is_reached {
-                numbers.remove(&thing.identity());
-                unreachable.push(thing.clone());
+        let gone = self.held.iter().filter(|(_, (object, _))| !heap.is_marked(*object));
+        let mut gone: Vec<u64> = gone.map(|(&number, _)| number).collect();
+        gone.sort_unstable();
+        for number in gone {
+            let Some((_, datum)) = self.held.remove(&number) else { continue };
+            if let DatumKind::Opaque(thing) = datum.kind() {
+                self.numbers.remove(&(thing.identity() as u64));
             }
-            is_reached
-        });
+            self.unreachable.push(datum);
+        }
     }
 
     /// Lets go of what the program cannot reach. A panic of the embedder's code goes no further.
@@ -103,9 +105,9 @@ impl Opaques {
 
 impl Drop for Opaques {
     fn drop(&mut self) {
-        for (_, (_, thing)) in std::mem::take(&mut self.held) {
-            drop(catch_unwind(AssertUnwindSafe(|| drop(thing))));
-        }
+        let mut held: Vec<(u64, (Value, Datum))> = std::mem::take(&mut self.held).into_iter().collect();
+        held.sort_unstable_by_key(|&(number, _)| number);
+        self.unreachable.extend(held.into_iter().map(|(_, (_, datum))| datum));
         self.let_go();
     }
 }

@@ -8,20 +8,21 @@
 
 use std::collections::BTreeMap;
 use std::future::ready as ready_future;
-use std::io::Error;
+use std::io::{Error, ErrorKind};
 use std::pin::{Pin, pin};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Wake, Waker, ready};
 use std::time::Duration;
 
+use esl_bytecode::datum::Datum;
 use esl_vm::host::HostFailure;
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, ReadBuf};
 use tokio::net::TcpStream;
 
 use super::{READ, SocketKind, Sockets, closed, lock, socket_failure, unless_closed};
 use crate::arrived::Arrived;
-use crate::data::{CallArguments, bytes_of, failure};
+use crate::data::{CallArguments, boolean, bytes_of, failure, integer};
 use crate::event_loop;
 use crate::operation::{Completion, OperationFuture};
 
@@ -37,10 +38,48 @@ pub(crate) struct Connection {
     reader: Mutex<SocketReader>,
     waiting: Arc<Waiting>,
     is_closed: AtomicBool,
-    writer: tokio::sync::Mutex<SocketWriter>,
+    writer: tokio::sync::Mutex<Writer>,
     arrived: Mutex<Arrived>,
     /// Whether the peer is to be told that nothing more comes, beside by the end of the connection.
     says_goodbye: bool,
+}
+
+/// The side of a connection that is written to.
+struct Writer {
+    stream: SocketWriter,
+    /// Bytes of a text of which the system has taken a part. They come before all others.
+    unsent: Vec<u8>,
+}
+
+impl Writer {
+    /// Writes bytes as far as the system takes them without delay, after those that are unsent. Returns
+    /// whether all that was given until now is written. If some of them cannot be, all are kept as unsent.
+    fn write_at_once(&mut self, bytes: &[u8]) -> Result<bool, Error> {
+        let mut context = Context::from_waker(Waker::noop());
+        self.unsent.extend_from_slice(bytes);
+        let mut sent = 0;
+        while sent < self.unsent.len() {
+            match Pin::new(&mut *self.stream).poll_write(&mut context, &self.unsent[sent..]) {
+                Poll::Ready(Ok(0)) => return Err(ErrorKind::WriteZero.into()),
+                Poll::Ready(written) => sent += written?,
+                Poll::Pending => break,
+            }
+        }
+        self.unsent.drain(..sent);
+        Ok(self.unsent.is_empty() && Pin::new(&mut *self.stream).poll_flush(&mut context)?.is_ready())
+    }
+
+    /// Writes what is unsent, and then these bytes. What is unsent stays so if this is left.
+    async fn write(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        while !self.unsent.is_empty() {
+            match self.stream.write(&self.unsent).await? {
+                0 => return Err(ErrorKind::WriteZero.into()),
+                sent => drop(self.unsent.drain(..sent)),
+            }
+        }
+        self.stream.write_all(bytes).await?;
+        self.stream.flush().await
+    }
 }
 
 /// Those who wait for a connection, in the order in which they came, and the greatest of their numbers.
@@ -136,7 +175,7 @@ impl Connection {
             reader: Mutex::new(Box::new(reader)),
             waiting: Arc::default(),
             is_closed: AtomicBool::new(false),
-            writer: tokio::sync::Mutex::new(Box::new(writer)),
+            writer: tokio::sync::Mutex::new(Writer { stream: Box::new(writer), unsent: Vec::new() }),
             arrived: Mutex::default(),
             says_goodbye,
         }))
@@ -191,7 +230,7 @@ impl Connection {
     /// Tells the peer that nothing more comes.
     async fn end(&self) {
         // It may be gone.
-        drop(self.writer.lock().await.shutdown().await);
+        drop(self.writer.lock().await.stream.shutdown().await);
     }
 
     /// Takes what has arrived. `NIL` at the end.
@@ -270,19 +309,30 @@ pub(super) fn wait(arguments: &CallArguments, sockets: &Sockets) -> OperationFut
     }
 }
 
-/// `%SOCKET-WRITE`: number, text, whether its characters are bytes.
+/// The bytes of a text to be written: the second argument, whose characters are bytes if the third says so.
+fn bytes_to_write(arguments: &CallArguments) -> Result<Vec<u8>, HostFailure> {
+    let text = arguments.text(1)?;
+    Ok(if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() })
+}
+
+/// `%SOCKET-SEND`: number, text, whether its characters are bytes. Writes as far as the system takes it without
+/// delay. Returns `NIL` if that was all; otherwise `T` if the rest is kept, and 0 if somebody else writes.
+pub(super) fn send(arguments: CallArguments, sockets: &Sockets) -> Result<Datum, HostFailure> {
+    let connection = sockets.get(arguments.number(0)?)?.connection()?;
+    let bytes = bytes_to_write(&arguments)?;
+    let Ok(mut writer) = connection.writer.try_lock() else { return Ok(integer(0)) };
+    let is_written = writer.write_at_once(&bytes).map_err(|error| socket_failure(&error))?;
+    Ok(boolean(!is_written))
+}
+
+/// `%SOCKET-WRITE`: number, text, whether its characters are bytes. Writes what is kept first.
 pub(super) async fn write(arguments: CallArguments, sockets: Sockets) -> Completion {
     let socket = sockets.get(arguments.number(0)?)?;
     let connection = socket.connection()?;
-    let text = arguments.text(1)?;
-    let bytes = if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() };
+    let bytes = bytes_to_write(&arguments)?;
     let mut write = pin!(async {
-        let mut writer = connection.writer.lock().await;
-        let written = async {
-            writer.write_all(&bytes).await?;
-            writer.flush().await
-        };
-        written.await.map_err(|error| socket_failure(&error))
+        let written = connection.writer.lock().await.write(&bytes).await;
+        written.map_err(|error| socket_failure(&error))
     });
     unless_closed(socket.closing.subscribe(), write.as_mut()).await?;
     Ok(Vec::new())

@@ -231,12 +231,11 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
     });
     define("%SOCKET-PORT", |arguments, sockets| Ok(integer(sockets.get(arguments.number(0)?)?.port)));
     define("%SOCKET-PEER", |arguments, sockets| Ok(text(&sockets.get(arguments.number(0)?)?.peer)));
-    define("%SOCKET-TAKE", |arguments, sockets| {
+    define("%SOCKET-SEND", connection::send);
+    define("%SOCKET-TAKE-LINE", |arguments, sockets| {
         let connection = sockets.get(arguments.number(0)?)?.connection()?;
         // Lines are taken one by one, so that bytes may follow a line of text.
-        Ok(connection.take(|arrived| {
-            if arguments.is_true(1) { arrived.take_text(true) } else { arrived.take_bytes(CHUNK) }
-        }))
+        Ok(connection.take(|arrived| arrived.take_text(true)))
     });
     define("%SOCKET-TAKE-BYTES", |arguments, sockets| {
         let connection = sockets.get(arguments.number(0)?)?.connection()?;
