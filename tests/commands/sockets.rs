@@ -395,17 +395,29 @@ fn bytes_and_text_take_turns_on_a_connection() {
       (format c \"ënd~%\")
       (finish-output c)
       (write-sequence (vector 1 195 2) c)
+      (format c \"plain~%lines~%\")
+      (write-sequence (vector 65 66 10 200 7) c)
       (read-line c nil nil)))
   (sockets:with-socket (c (sockets:connect \"127.0.0.1\" (sockets:local-port listener)))
     (let ((data (make-array 300 :element-type '(unsigned-byte 8))))
       (print (list (read-line c) (read-sequence data c)))
       (print (loop for i below 300 always (= (aref data i) (mod i 256))))
       (print (list (read-byte c) (read-line c) (read-byte c) (read-byte c) (read-byte c)))
+      ;; Lines that were read ahead are bytes again.
+      (let ((data (make-array 11)))
+        (print (list (read-line c) (read-sequence data c) data)))
       (terpri c)
       (finish-output c)
       (print (list (read-byte c nil :end) (read-sequence data c :start 2))))
     (print (handler-case (write-byte 256 c) (type-error () 'refused)))))";
-    let expected = ["(\"sïze 300\" 300)", "T", "(254 \"ënd\" 1 195 2)", "(:END 2)", "REFUSED"];
+    let expected = [
+        "(\"sïze 300\" 300)",
+        "T",
+        "(254 \"ënd\" 1 195 2)",
+        "(\"plain\" 11 #(108 105 110 101 115 10 65 66 10 200 7))",
+        "(:END 2)",
+        "REFUSED",
+    ];
     check("sockets-bytes", text, &["--allow-net=127.0.0.1"], &expected);
 }
 

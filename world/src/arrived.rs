@@ -78,6 +78,21 @@ impl Arrived {
         self.take(count, |bytes| text(&String::from_utf8_lossy(bytes)))
     }
 
+    /// Takes whole lines of ASCII text if there are some, otherwise whole characters up to the first line end.
+    /// `NIL` at the end. Of ASCII text each character is a byte, whatever the program takes it for.
+    pub(crate) fn take_lines(&mut self) -> Datum {
+        let rest = self.rest();
+        let is_text = |&&byte: &&u8| matches!(byte, b'\t' | b'\n' | b'\r' | b' '..=b'~');
+        let plain = &rest[..rest.iter().take_while(is_text).count()];
+        match plain.iter().rposition(|&byte| byte == b'\n') {
+            Some(end) => {
+                self.is_new = end + 1 < rest.len();
+                self.take(end + 1, |bytes| text(&String::from_utf8_lossy(bytes)))
+            }
+            None => self.take_text(true),
+        }
+    }
+
     /// Takes at most so many bytes, as a string. `NIL` at the end.
     pub(crate) fn take_bytes(&mut self, limit: usize) -> Datum {
         let rest = self.rest();
@@ -112,6 +127,19 @@ pub(crate) fn whole_characters(bytes: &[u8]) -> usize {
 mod tests {
     use super::*;
     use crate::data::text_of;
+
+    #[test]
+    fn lines_of_ascii_are_taken_together_and_others_one_by_one() {
+        let mut arrived = Arrived::default();
+        arrived.add("one\ttwo\r\nthree\nfour ä\nfive\n\0\nsix".as_bytes());
+        let mut taken = Vec::new();
+        while arrived.is_something() {
+            taken.push(text_of(&arrived.take_lines()).map(str::to_owned));
+        }
+        let expected = ["one\ttwo\r\nthree\n", "four ä\n", "five\n", "\0\n", "six"];
+        assert_eq!(taken, expected.map(|text| Some(text.to_owned())));
+        assert_eq!(arrived.position(), 33);
+    }
 
     #[test]
     fn a_character_that_is_cut_waits_for_its_rest() {

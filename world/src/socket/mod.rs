@@ -25,7 +25,7 @@ pub(crate) use connection::Connection;
 use datagram::Datagrams;
 use listener::{Listener, bind_failure};
 
-use crate::arrived::whole_characters;
+use crate::arrived::{Arrived, whole_characters};
 use crate::data::{CallArguments, bytes_of, failure, handle, integer, nil, text, text_of_bytes};
 #[cfg(feature = "serial")]
 use crate::operation::define;
@@ -232,10 +232,9 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
     define("%SOCKET-PORT", |arguments, sockets| Ok(integer(sockets.get(arguments.number(0)?)?.port)));
     define("%SOCKET-PEER", |arguments, sockets| Ok(text(&sockets.get(arguments.number(0)?)?.peer)));
     define("%SOCKET-SEND", connection::send);
-    define("%SOCKET-TAKE-LINE", |arguments, sockets| {
-        let connection = sockets.get(arguments.number(0)?)?.connection()?;
-        // Lines are taken one by one, so that bytes may follow a line of text.
-        Ok(connection.take(|arrived| arrived.take_text(true)))
+    define("%SOCKET-TAKE-LINES", |arguments, sockets| {
+        // Not all text is taken, so that bytes may follow a line.
+        Ok(sockets.get(arguments.number(0)?)?.connection()?.take(Arrived::take_lines))
     });
     define("%SOCKET-TAKE-BYTES", |arguments, sockets| {
         let connection = sockets.get(arguments.number(0)?)?.connection()?;
