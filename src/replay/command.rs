@@ -78,7 +78,7 @@ pub fn run(options: &ReplayOptions) -> Result<u8, u8> {
     };
     if replayed == Replayed::Cut && !options.check {
         complain(format_args!(
-            "the recording ends here, at tick {}: whoever made it was killed",
+            "the recording ends here, at tick {}: the run was killed, or the system has refused it memory",
             rerun.check().ticks
         ));
     }

@@ -101,4 +101,11 @@ impl Recorder for FileRecorder {
     fn flush(&self) {
         self.writing().flush();
     }
+
+    fn break_off(&self) {
+        let mut writing = self.writing();
+        writing.flush();
+        let why = "the system has refused memory, which a replay cannot repeat; the recording ends there";
+        writing.error.get_or_insert_with(|| io::Error::new(io::ErrorKind::OutOfMemory, why));
+    }
 }

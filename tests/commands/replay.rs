@@ -320,3 +320,27 @@ fn mistakes_in_commands_are_answered() {
         assert_eq!((wrong.status, &*wrong.output), (Some(2), ""));
     }
 }
+
+/// A replay may have the memory that the run was refused, so the recording ends before that shows.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_ends_where_the_system_refuses_memory() {
+    let folder = Folder::new("refused-memory");
+    let program = "(sleep 0.01)
+(princ 'begun)
+(finish-output)
+(let ((all nil))
+  (princ (handler-case (loop (push (make-array 10000000 :element-type '(unsigned-byte 8)) all))
+           (storage-condition () 'no-room))))
+(sleep 0.01)
+(princ 'on)";
+    let (source, recording) = (folder.file("program.esl", program), folder.join("run.eslj"));
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "ulimit -v 400000; exec \"$0\" run --memory 600M --record \"$1\" \"$2\""]);
+    let run = process::run(shell.args([env!("CARGO_BIN_EXE_eslvm"), &recording, &source]), "");
+    assert_eq!((run.status, run.output.trim()), (Some(0), "BEGUNNO-ROOMON"), "{}", run.errors);
+    assert!(run.errors.contains("is not whole: the system has refused memory"), "{}", run.errors);
+    let replay = replay(&[&recording], "");
+    assert_eq!((replay.status, replay.output.trim()), (Some(0), "BEGUN"), "{}", replay.errors);
+    assert!(replay.errors.contains("or the system has refused it memory"), "{}", replay.errors);
+}

@@ -356,7 +356,9 @@ impl Heap {
     /// Takes a new arena from the system. Its number is the least free one.
     fn grow(&mut self) -> Option<usize> {
         let number = self.arenas.iter().position(Option::is_none).unwrap_or(self.arenas.len());
-        let mut arena = Arena::new(u32::try_from(number).ok()?, self.has_images)?;
+        let arena = Arena::new(u32::try_from(number).ok()?, self.has_images);
+        self.is_refused |= arena.is_none();
+        let mut arena = arena?;
         arena.is_lent = self.taken().saturating_add(ARENA) > self.limit_for_all();
         if number == self.arenas.len() {
             self.arenas.push(Some(arena));
@@ -384,8 +386,9 @@ impl Heap {
             error => error,
         })?;
         // The current epoch: marked while marking and not yet swept while sweeping; stale by the next cycle.
-        let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch, is_zeroed)
-            .ok_or(AllocError::NeedCollection)?;
+        let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch, is_zeroed);
+        self.is_refused |= large.is_none();
+        let large = large.ok_or(AllocError::NeedCollection)?;
         let object = large.object();
         self.large.push(large);
         self.large_number += 1;

@@ -215,6 +215,8 @@ pub struct Heap {
     identity: Arc<()>,
     /// Greatest number of a page of a vector that is the machine's own ([`Heap::own_vector`]).
     numbered: u64,
+    /// Whether the system has had no memory for an arena or a large object.
+    is_refused: bool,
 }
 
 list_state! { Pacing { floor: Run, threshold: Run, since_cycle: Run, black: Run, owed: Run } }
@@ -256,6 +258,7 @@ list_state! {
         has_images: Process,
         identity: Process,
         numbered: Process,
+        is_refused: Process,
     }
 }
 
@@ -294,6 +297,7 @@ impl Heap {
             has_images: config.images,
             identity: Arc::default(),
             numbered: 0,
+            is_refused: false,
         }
     }
 
@@ -335,6 +339,11 @@ impl Heap {
     /// scanned.
     pub fn cycle_id(&self) -> u64 {
         self.cycle_id
+    }
+
+    /// Returns whether the system has refused memory below the limit: what follows depends on that too.
+    pub fn is_refused(&self) -> bool {
+        self.is_refused
     }
 
     /// Opens the reserve above the limit, for the clause that handles `:heap-exhausted`. Returns false if it

@@ -1,5 +1,6 @@
 //! `eslvm run`.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use esl::command::{self, SignalTarget, USAGE, complain};
@@ -135,7 +136,11 @@ pub(crate) fn run(
     if let Some((recorder, path)) = recording
         && let Err(error) = recorder.end(&machine, status)
     {
-        status = not_written(path, &error);
+        match error.kind() {
+            // Nothing that the program has done is wrong.
+            ErrorKind::OutOfMemory => complain(format_args!("{} is not whole: {error}", path.display())),
+            _ => status = not_written(path, &error),
+        }
     }
     if let Some((timeline, path)) = timeline
         && let Err(error) = timeline.end(&mut machine)

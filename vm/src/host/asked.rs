@@ -246,6 +246,10 @@ impl Host for Asked {
         self.host.broken_output_status()
     }
 
+    fn hear_of_refusal(&mut self) {
+        self.host.hear_of_refusal();
+    }
+
     fn check(&mut self, check: RunCheck) {
         // No question of the run's.
         self.host.check(check);

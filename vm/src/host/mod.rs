@@ -340,6 +340,10 @@ pub trait Host {
         0
     }
 
+    /// Is told that the system has refused memory, which may change the course of the run: before the first
+    /// answer that could depend on it, and again later.
+    fn hear_of_refusal(&mut self) {}
+
     /// Is told how far the run is, now and then: always in the same rounds.
     fn check(&mut self, check: RunCheck) {
         let _ = check;

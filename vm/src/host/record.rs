@@ -183,6 +183,9 @@ pub trait Recorder: Send {
 
     /// Is told that nothing may come for a while: what was given so far should be safe.
     fn flush(&self) {}
+
+    /// Is told that a replay cannot repeat what follows: no more is to be kept.
+    fn break_off(&self) {}
 }
 
 /// The records of a run, kept in memory while they are made.
@@ -385,6 +388,10 @@ impl<H: Host, R: Recorder> Host for RecordingHost<H, R> {
             self.note_plain(Checked(check));
             self.recorder.flush();
         }
+    }
+
+    fn hear_of_refusal(&mut self) {
+        self.recorder.break_off();
     }
 
     fn broken_output_status(&self) -> u8 {

@@ -7,6 +7,7 @@ use esl_bytecode::builtin::BUILTINS;
 use super::call::{FramePlace, call};
 use super::{Signal, aux_at, failure, word_at};
 use crate::describe::describe;
+use crate::host::Host;
 use crate::raise::{Exit, Raised};
 use crate::saved_pc::SavedPc;
 use crate::schedule::TurnEnd;
@@ -90,6 +91,9 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
 /// # Safety
 /// The contract of [`super::settle`].
 unsafe fn collect(vm: &mut Vm) -> Signal {
+    if vm.heap.is_refused() {
+        vm.outside.host.hear_of_refusal();
+    }
     // SAFETY: V1: `pc` is at an instruction.
     let word = unsafe { word_at(vm.cpu.pc()) };
     let is_call = FramePlace::for_instruction(word) != FramePlace::Above;
