@@ -22,7 +22,9 @@ const PROGRAM: &str = "(defvar *speed* 3)
 (defstruct wheel size)
 (spawn (:name 'worker :daemon t)
   (loop (wait-for-event *go*) (setq *got* (stumble 5))))
-(spawn (:name 'idler :daemon t) (loop (sleep 1000)))
+(define-property mode (device))
+(to-achieve (mode device value) (t (assert (list 'mode device value))))
+(spawn (:name 'idler :daemon t) (with-maintained-property (mode 'camera :idle) (loop (sleep 1000))))
 (read-line *standard-input* nil)
 (format t \"~s~%\" (drive 2))";
 
@@ -196,7 +198,8 @@ fn a_client_evaluates_looks_up_and_compiles() {
     assert_eq!(client.ask("(swank:quit-inspector)"), "(:ok nil)");
     // Tasks.
     let tasks = client.ask("(swank:list-threads)");
-    assert!(tasks.starts_with("(:ok ((:id :name :status) ("), "{tasks}");
+    assert!(tasks.starts_with("(:ok ((:id :name :status :holds) ("), "{tasks}");
+    assert!(tasks.contains("\"(MODE CAMERA :IDLE)\")"), "{tasks}");
     let row = tasks.split("\") (").position(|row| row.contains("IDLER")).expect("it is there");
     assert_eq!(client.ask(&format!("(cl:mapc 'swank:kill-nth-thread '({row}))")), "(:ok t)");
     assert!(client.ask("(cl:mapc 'print '(1))").starts_with("(:abort \"`cl:mapc` is a request only "));

@@ -172,9 +172,10 @@ impl OperatorSession {
         match step {
             SlimeStep::Answer(answer) => Ok(answer),
             SlimeStep::Tasks => {
-                let survey = self.look(SurveyRequest { tasks: TASKS, ..SurveyRequest::default() }).await?;
+                let survey =
+                    self.look(SurveyRequest { tasks: TASKS, data: true, ..SurveyRequest::default() }).await?;
                 *self.table() = survey.tasks.iter().map(|task| task.number).collect();
-                Ok(slime::table(&survey.tasks))
+                Ok(slime::table(&survey.tasks, &survey.locks))
             }
             SlimeStep::AbortTasks(rows) => {
                 for row in rows {

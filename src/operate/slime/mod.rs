@@ -13,7 +13,7 @@ mod request;
 use std::path::Path;
 
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_vm::host::SurveyedTask;
+use esl_vm::host::{LockRow, SurveyedTask};
 
 use super::attach::WireForm;
 use super::attach::datum::{boolean, integer, list, string};
@@ -139,9 +139,13 @@ pub(super) fn thread_of(form: &WireForm) -> Datum {
     form.as_integer().map_or(boolean(false), integer)
 }
 
-/// Returns the table of tasks.
-pub(super) fn table(tasks: &[SurveyedTask]) -> WireForm {
-    let titles = [":id", ":name", ":status"].map(WireForm::symbol);
+/// Returns the table of tasks, with the properties whose locks each owns.
+pub(super) fn table(tasks: &[SurveyedTask], locks: &[LockRow]) -> WireForm {
+    let titles = [":id", ":name", ":status", ":holds"].map(WireForm::symbol);
+    let held_by = |task: &SurveyedTask| {
+        let held = locks.iter().filter(|lock| lock.subscribers.first() == Some(&task.number));
+        held.map(|lock| &*lock.property).collect::<Vec<_>>().join(", ")
+    };
     let row = |task: &SurveyedTask| {
         let state = match &task.waits_for {
             Some(reason) => format!("waits for {reason}"),
@@ -151,6 +155,7 @@ pub(super) fn table(tasks: &[SurveyedTask]) -> WireForm {
             WireForm::Integer(task.number as i64),
             WireForm::text(&task.name),
             WireForm::Text(state),
+            WireForm::Text(held_by(task)),
         ])
     };
     WireForm::list([WireForm::list(titles)].into_iter().chain(tasks.iter().map(row)))
