@@ -78,8 +78,8 @@ impl Arrived {
         self.take(count, |bytes| text(&String::from_utf8_lossy(bytes)))
     }
 
-    /// Takes whole lines of ASCII text if there are some, otherwise whole characters up to the first line end.
-    /// `NIL` at the end. Of ASCII text each character is a byte, whatever the program takes it for.
+    /// Takes whole lines of ASCII text if there are some, otherwise whole characters up to the first line
+    /// end. `NIL` at the end. Of ASCII text each character is a byte, whatever the program takes it for.
     pub(crate) fn take_lines(&mut self) -> Datum {
         let rest = self.rest();
         let is_text = |&&byte: &&u8| matches!(byte, b'\t' | b'\n' | b'\r' | b' '..=b'~');
