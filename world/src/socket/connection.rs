@@ -316,7 +316,8 @@ fn bytes_to_write(arguments: &CallArguments) -> Result<Vec<u8>, HostFailure> {
 }
 
 /// `%SOCKET-SEND`: number, text, whether its characters are bytes. Writes as far as the system takes it
-/// without delay. Returns `NIL` if that was all; otherwise `T` if the rest is kept, and 0 if somebody else writes.
+/// without delay. Returns `NIL` if that was all; otherwise `T` if the rest is kept, and 0 if somebody else
+/// writes.
 pub(super) fn send(arguments: CallArguments, sockets: &Sockets) -> Result<Datum, HostFailure> {
     let connection = sockets.get(arguments.number(0)?)?.connection()?;
     let bytes = bytes_to_write(&arguments)?;
