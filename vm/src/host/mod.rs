@@ -340,8 +340,8 @@ pub trait Host {
         0
     }
 
-    /// Is told that the system has refused memory, which may change the course of the run: before the first
-    /// answer that could depend on it, and again later.
+    /// Is told that the system has refused memory, which may change the course of the run: when a task next
+    /// lacks room, and each time again.
     fn hear_of_refusal(&mut self) {}
 
     /// Is told how far the run is, now and then: always in the same rounds.
