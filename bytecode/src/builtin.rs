@@ -1449,13 +1449,13 @@ macro_rules! for_each_builtin {
             /// Waits for the next signal of what a form has read, or of any event if that is nothing or too
             /// much; returns at once if there was one since it was read. `what` is for reports.
             WaitForReads = coordination::wait_for_reads, internal "%WAIT-FOR-READS" ("reads what");
-            /// Grants a request, for a claim of one resource alone, if nobody waits for that and there is
-            /// enough. Whether it has.
-            GrantAtOnce = coordination::grant_at_once, internal "%GRANT-AT-ONCE" ("request claim resource");
-            /// Takes from a request what it holds, a claim of one resource alone, if nobody waits for that.
-            /// Whether the request holds nothing now.
-            GiveBackAtOnce = coordination::give_back_at_once, internal "%GIVE-BACK-AT-ONCE"
-                ("request claim resource");
+            /// A request of this task, made in a form with the request `outer`, which holds so much of the
+            /// resource called `name`; `NIL` if others wait for that, or if there is not enough.
+            RequestAtOnce = coordination::request_at_once, internal "%REQUEST-AT-ONCE"
+                ("name amount priority outer");
+            /// Takes from a request, if that is not `NIL`, what it holds: a claim of one resource alone, if
+            /// nobody waits for that. Whether the request holds nothing now.
+            GiveBackAtOnce = coordination::give_back_at_once, internal "%GIVE-BACK-AT-ONCE" ("request");
 
             // ---- tasks
             /// A new task that calls a function. `daemon` may be `:internal` for one that is not listed, or

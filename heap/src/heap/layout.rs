@@ -132,6 +132,12 @@ impl Kind {
         (self as u8) < Kind::HashTable as u8
     }
 
+    /// Returns whether these objects are numbers, which are `eql` by their values.
+    #[inline(always)]
+    pub const fn is_boxed_number(self) -> bool {
+        matches!(self, Kind::Ratio | Kind::Complex | Kind::Float | Kind::Bignum)
+    }
+
     /// Returns whether no slot is a value, so that the collector need not look inside.
     #[inline(always)]
     pub const fn is_raw(self) -> bool {

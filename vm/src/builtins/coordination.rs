@@ -9,7 +9,7 @@ use smallvec::SmallVec;
 
 use crate::builtins::LIMIT;
 use crate::equality::{self, KeyTest};
-use crate::heap::Heap;
+use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome};
 use crate::run;
 use crate::value::Value;
@@ -18,6 +18,7 @@ use crate::wait::{WaitOptions, event, link};
 
 use super::event::begin_wait;
 use super::expect::exactly;
+use super::lookup;
 
 /// The fields of a source.
 mod source {
@@ -35,20 +36,33 @@ mod reads {
     pub(super) const ANY: usize = 4;
 }
 
-/// The fields of a resource, a claim and a request.
+/// The fields of a resource.
 mod resource {
     pub(super) const HOLDERS: usize = 1;
-    pub(super) const WAITERS: usize = 2;
-    pub(super) const CAPACITY: usize = 6;
     pub(super) const USED: usize = 7;
     /// Element of a shelf: the bits of the priorities at which claims are.
     pub(super) const BITS: usize = 8;
-    /// Fields of a claim.
+}
+
+/// The fields of a claim.
+mod claim {
     pub(super) const NEXT: usize = 0;
     pub(super) const PREVIOUS: usize = 1;
+    pub(super) const REQUEST: usize = 4;
+    pub(super) const RESOURCE: usize = 5;
     pub(super) const AMOUNT: usize = 6;
-    /// Field of a request.
+    pub(super) const LENGTH: usize = 8;
+}
+
+/// The fields of a request.
+mod request {
+    pub(super) const TASK: usize = 0;
+    pub(super) const CLAIMS: usize = 1;
+    pub(super) const SIZE: usize = 2;
+    pub(super) const PRIORITY: usize = 3;
     pub(super) const STATE: usize = 5;
+    pub(super) const OUTER: usize = 7;
+    pub(super) const LENGTH: usize = 10;
 }
 
 /// The most sources that one wait is for; with more, any signal wakes.
@@ -67,12 +81,11 @@ pub(super) fn set_fluent(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Err(Exit::Slowly);
     }
     vm.scheduler.point()?;
+    let Some(&[event, before]) = vm.heap.slots(fluent, Kind::SimpleVector) else { return Ok(value) };
     let mut work = LIMIT;
-    let before = vm.heap.slot_or_nil(fluent, source::VALUE);
     match equality::same(&vm.heap, KeyTest::Equal, before, value, &mut work) {
         Some(true) => {}
         Some(false) => {
-            let event = vm.heap.slot_or_nil(fluent, source::EVENT);
             if !event::is_event(&vm.heap, event) {
                 return vm.exchange.not_a(event, vm.world.known.event);
             }
@@ -100,8 +113,10 @@ pub(super) fn new_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn noted_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [fluent, reads] = exactly(arguments);
     // Tasks made by the form have copies of its binding.
-    if vm.heap.slot_or_nil(reads, reads::TASK) == vm.scheduler.task().object {
-        if vm.heap.slot_or_nil(reads, reads::WATCH).is_true() {
+    if let Some(&[task, _, _, watch]) = vm.heap.slots(reads, Kind::SimpleVector)
+        && task == vm.scheduler.task().object
+    {
+        if watch.is_true() {
             return Err(Exit::Slowly);
         }
         note_source(vm, fluent, reads)?;
@@ -116,15 +131,17 @@ pub(super) fn note_read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// Notes that a form has read a source, with the count of its event. Returns whether it was not noted yet.
 fn note_source(vm: &mut Vm, source: Value, reads: Value) -> Result<bool, Exit> {
-    if vm.heap.slot_or_nil(source, source::SEEN) == reads {
+    let Some(&[event, _, seen]) = vm.heap.slots(source, Kind::SimpleVector) else { return Ok(false) };
+    if seen == reads {
         return Ok(false);
     }
     vm.scheduler.point_of_read()?;
-    let sources = vm.heap.cons(source, vm.heap.slot_or_nil(reads, reads::SOURCES))?;
-    let count = event::count(&vm.heap, vm.heap.slot_or_nil(source, source::EVENT));
-    let sum = vm.heap.slot_or_nil(reads, reads::COUNT).as_fixnum().unwrap_or(0).wrapping_add(count);
-    vm.heap.slot_set(reads, reads::COUNT, Value::fixnum(sum).unwrap_or(Value::small(0)));
-    vm.heap.slot_set(reads, reads::SOURCES, sources);
+    let Some(&[_, sources, sum]) = vm.heap.slots(reads, Kind::SimpleVector) else { return Ok(false) };
+    let sources = vm.heap.cons(source, sources)?;
+    let sum = sum.as_fixnum().unwrap_or(0).wrapping_add(event::count(&vm.heap, event));
+    if let Some([_, noted, count]) = vm.heap.slots_mut::<3>(reads, Kind::SimpleVector) {
+        (*noted, *count) = (sources, Value::fixnum(sum).unwrap_or(Value::small(0)));
+    }
     vm.heap.slot_set(source, source::SEEN, reads);
     Ok(true)
 }
@@ -158,96 +175,123 @@ pub(super) fn wait_for_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Ok(Value::NIL);
     }
     vm.scheduler.point()?;
+    let options = WaitOptions { what, ..WaitOptions::default() };
+    if let Some((event, count)) = only_event(&vm.heap, reads) {
+        if event::count(&vm.heap, event) != count {
+            return Ok(Value::NIL);
+        }
+        let wait = begin_wait(vm, event, options)?;
+        return vm.scheduler.park_at(wait, None);
+    }
     let (events, count) = events_of_reads(vm, reads);
     vm.exchange.charge_elements(events.len());
     let now = events.iter().fold(0_i64, |sum, &event| sum.wrapping_add(event::count(&vm.heap, event)));
     if now != count {
         return Ok(Value::NIL);
     }
-    let options = WaitOptions { what, ..WaitOptions::default() };
-    let wait = match events[..] {
-        [event] => begin_wait(vm, event, options)?,
-        _ => {
-            let events = vm.heap.list(&events)?;
-            begin_wait(vm, events, options)?
-        }
-    };
+    let events = vm.heap.list(&events)?;
+    let wait = begin_wait(vm, events, options)?;
     vm.scheduler.park_at(wait, None)
 }
 
-// ---- resources
-
-/// Returns a field that is a number.
-fn number(heap: &Heap, record: Value, field: usize) -> Option<i64> {
-    heap.slot_or_nil(record, field).as_fixnum()
+/// Returns the event of what a form has read, with its count from before, if that is one source.
+fn only_event(heap: &Heap, reads: Value) -> Option<(Value, i64)> {
+    let &[_, sources, count] = heap.slots(reads, Kind::SimpleVector)?;
+    let sources = heap.as_cons(sources).filter(|sources| sources.cdr.is_nil())?;
+    Some((heap.slot_or_nil(sources.car, source::EVENT), count.as_fixnum()?))
 }
+
+// ---- resources
 
 /// Returns whether no claim is on a shelf.
 fn is_empty_shelf(heap: &Heap, shelf: Value) -> bool {
     heap.slot_or_nil(shelf, resource::BITS) == Value::small(0)
 }
 
-pub(super) fn grant_at_once(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [request, claim, resource] = exactly(arguments);
-    vm.scheduler.point()?;
-    let heap = &mut vm.heap;
-    let numbers = (
-        number(heap, resource, resource::CAPACITY),
-        number(heap, resource, resource::USED),
-        number(heap, claim, resource::AMOUNT),
-    );
-    let (Some(capacity), Some(used), Some(amount)) = numbers else { return Ok(Value::NIL) };
-    let used = used.saturating_add(amount);
-    let waiters = heap.slot_or_nil(resource, resource::WAITERS);
-    let Some(sum) = Value::fixnum(used).filter(|_| used <= capacity && is_empty_shelf(heap, waiters)) else {
-        return Ok(Value::NIL);
-    };
-    let first = heap.slot_or_nil(resource, resource::HOLDERS);
-    if first.is_nil() {
-        heap.slot_set(claim, resource::NEXT, claim);
-        heap.slot_set(claim, resource::PREVIOUS, claim);
-        heap.slot_set(resource, resource::HOLDERS, claim);
-    } else {
-        let last = heap.slot_or_nil(first, resource::PREVIOUS);
-        heap.slot_set(last, resource::NEXT, claim);
-        heap.slot_set(claim, resource::PREVIOUS, last);
-        heap.slot_set(claim, resource::NEXT, first);
-        heap.slot_set(first, resource::PREVIOUS, claim);
-    }
-    heap.slot_set(resource, resource::USED, sum);
-    heap.slot_set(request, resource::STATE, vm.world.known.granted);
-    Ok(Value::T)
+/// Returns the resource with this name, and how much of it would be used if a request got so much
+/// of it; `None` if there is no such resource, if others wait for it, or if the request has to be looked at.
+fn free_resource(vm: &mut Vm, name: Value, amount: Value, priority: Value) -> Option<(Value, Value)> {
+    let plist = vm.heap.symbol(name)?.plist;
+    let resource = lookup::getf(vm, &[plist, vm.world.known.resource]).ok()?;
+    let [.., waiters, _, _, _, capacity, used] =
+        vm.heap.slots::<{ resource::USED + 1 }>(resource, Kind::SimpleVector)?;
+    let (capacity, used) = (capacity.as_fixnum()?, used.as_fixnum()?);
+    let sum = amount.as_fixnum().filter(|&amount| amount >= 1)?.checked_add(used)?;
+    let is_free =
+        sum <= capacity && matches!(priority.as_fixnum(), Some(0..=7)) && is_empty_shelf(&vm.heap, *waiters);
+    Some((resource, Value::fixnum(sum).filter(|_| is_free)?))
 }
 
-pub(super) fn give_back_at_once(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [request, claim, resource] = exactly(arguments);
+pub(super) fn request_at_once(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [name, amount, priority, outer] = exactly(arguments);
     vm.scheduler.point()?;
+    let Some((resource, used)) = free_resource(vm, name, amount, priority) else { return Ok(Value::NIL) };
     let heap = &mut vm.heap;
-    let state = heap.slot_or_nil(request, resource::STATE);
-    if state.is_nil() {
-        return Ok(Value::T);
+    let mut request = [Value::NIL; request::LENGTH];
+    request[request::TASK] = vm.scheduler.task().object;
+    request[request::SIZE] = Value::small(1);
+    request[request::PRIORITY] = priority;
+    request[request::STATE] = vm.world.known.granted;
+    request[request::OUTER] = outer;
+    let request = heap.alloc_vector(&request)?;
+    let first = heap.slot_or_nil(resource, resource::HOLDERS);
+    let mut claim = [Value::NIL; claim::LENGTH];
+    claim[claim::REQUEST] = request;
+    claim[claim::RESOURCE] = resource;
+    claim[claim::AMOUNT] = amount;
+    claim[claim::NEXT] = first;
+    claim[claim::PREVIOUS] = heap.slot_or_nil(first, claim::PREVIOUS);
+    let claim = heap.alloc_vector(&claim)?;
+    let claims = heap.cons(claim, Value::NIL)?;
+    heap.slot_set(request, request::CLAIMS, claims);
+    if first.is_nil() {
+        heap.slot_set(claim, claim::NEXT, claim);
+        heap.slot_set(claim, claim::PREVIOUS, claim);
+        heap.slot_set(resource, resource::HOLDERS, claim);
+    } else {
+        let last = heap.slot_or_nil(first, claim::PREVIOUS);
+        heap.slot_set(last, claim::NEXT, claim);
+        heap.slot_set(first, claim::PREVIOUS, claim);
     }
-    let waiters = heap.slot_or_nil(resource, resource::WAITERS);
-    let numbers = (number(heap, resource, resource::USED), number(heap, claim, resource::AMOUNT));
-    let (Some(used), Some(amount)) = numbers else { return Ok(Value::NIL) };
-    let left = Value::fixnum(used.saturating_sub(amount));
-    let Some(left) = left.filter(|_| state == vm.world.known.granted && is_empty_shelf(heap, waiters)) else {
-        return Ok(Value::NIL);
-    };
-    let (next, previous) =
-        (heap.slot_or_nil(claim, resource::NEXT), heap.slot_or_nil(claim, resource::PREVIOUS));
+    heap.slot_set(resource, resource::USED, used);
+    Ok(request)
+}
+
+/// Takes from a request what it holds, if that is an amount of one resource that nobody waits for; `None` if
+/// it is not.
+fn give_back(heap: &mut Heap, request: Value, granted: Value) -> Option<()> {
+    let &[_, claims, _, _, _, state] = heap.slots(request, Kind::SimpleVector)?;
+    if state.is_nil() {
+        return Some(());
+    }
+    let claim = heap.as_cons(claims).filter(|claims| state == granted && claims.cdr.is_nil())?.car;
+    let &[next, previous, _, _, _, resource, amount, preemptible] = heap.slots(claim, Kind::SimpleVector)?;
+    let &[_, _, waiters, _, _, _, _, used] = heap.slots(resource, Kind::SimpleVector)?;
+    let left = Value::fixnum(used.as_fixnum()?.checked_sub(amount.as_fixnum()?)?)?;
+    if preemptible.is_true() || !is_empty_shelf(heap, waiters) {
+        return None;
+    }
     if next == claim {
         heap.slot_set(resource, resource::HOLDERS, Value::NIL);
     } else {
-        heap.slot_set(previous, resource::NEXT, next);
-        heap.slot_set(next, resource::PREVIOUS, previous);
+        heap.slot_set(previous, claim::NEXT, next);
+        heap.slot_set(next, claim::PREVIOUS, previous);
         if heap.slot_or_nil(resource, resource::HOLDERS) == claim {
             heap.slot_set(resource, resource::HOLDERS, next);
         }
     }
-    heap.slot_set(claim, resource::NEXT, Value::NIL);
-    heap.slot_set(claim, resource::PREVIOUS, Value::NIL);
+    heap.slot_set(claim, claim::NEXT, Value::NIL);
+    heap.slot_set(claim, claim::PREVIOUS, Value::NIL);
     heap.slot_set(resource, resource::USED, left);
-    heap.slot_set(request, resource::STATE, Value::NIL);
-    Ok(Value::T)
+    heap.slot_set(request, request::STATE, Value::NIL);
+    Some(())
+}
+
+pub(super) fn give_back_at_once(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [request] = exactly(arguments);
+    if request.is_nil() {
+        return Ok(Value::T);
+    }
+    vm.scheduler.point()?;
+    Ok(Value::boolean(give_back(&mut vm.heap, request, vm.world.known.granted).is_some()))
 }

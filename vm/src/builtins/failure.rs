@@ -147,19 +147,21 @@ fn belongs_to_form(vm: &Vm) -> bool {
 }
 
 pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [story, ending] = [2, 3].map(|index| vm.heap.string_text(arguments[index]).unwrap_or_default());
+    let text = |vm: &Vm, index: usize| vm.heap.string_text(arguments[index]).unwrap_or_default();
     match vm.scheduler.task().control.final_unwinding() {
         Some(UnwindTarget::Root(TaskEnd::Failed(_))) => {
+            let story = text(vm, 2);
             if let Some(report) = &mut vm.scheduler.task_mut().extra_mut().report {
                 report.add_cleanup(&story);
             }
         }
         Some(_) => {
             let label = report::task_label(vm, vm.scheduler.task().object);
-            vm.outside.complain(&format!("In a cleanup of {label}:\n{story}{ending}"));
+            vm.outside.complain(&format!("In a cleanup of {label}:\n{}{}", text(vm, 2), text(vm, 3)));
         }
         None if belongs_to_form(vm) => {}
         None => {
+            let (story, ending) = (text(vm, 2), text(vm, 3));
             vm.embedder.last_words = vm.heap.string_text(arguments[1]);
             vm.embedder.last_place = report::place_in_program(vm, vm.scheduler.task(), vm.frames());
             let is_wanted = vm.watch.tells_variables;

@@ -169,12 +169,13 @@ pub(super) unsafe fn loop_count(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 /// Returns whether two values are `eql`.
 #[inline(always)]
 pub(super) fn eql(vm: &Vm, a: Value, b: Value) -> bool {
-    a == b || (a.is_object() && b.is_object() && eql_objects(vm, a, b))
+    let is_number = |object| vm.heap.kind(object).is_some_and(Kind::is_boxed_number);
+    a == b || (a.is_object() && b.is_object() && is_number(b) && eql_numbers(vm, a, b))
 }
 
 #[cold]
 #[inline(never)]
-fn eql_objects(vm: &Vm, a: Value, b: Value) -> bool {
+fn eql_numbers(vm: &Vm, a: Value, b: Value) -> bool {
     number::eql(&vm.heap, a, b)
 }
 

@@ -184,28 +184,34 @@ pub(super) unsafe fn bind_list(vm: &mut Vm, pc: *const u32, base: *mut Value) ->
 /// `enter-cleanup`.
 #[inline(never)]
 pub(super) unsafe fn enter_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value) -> Signal {
-    let values = std::mem::take(&mut vm.exchange.values);
-    let control = &mut vm.scheduler.task_mut().control;
-    if let Some(entry) = control.entries.pop() {
-        control.run_cleanup(entry, RunningCleanup { values, ..RunningCleanup::default() });
-    }
+    // The room of an empty list stays where it will be needed.
+    let values = &mut vm.exchange.values;
+    let values = if values.is_empty() { Vec::new() } else { std::mem::take(values) };
+    vm.scheduler.task_mut().control.enter_cleanup(values);
     Signal::Next
 }
 
 /// `end-cleanup`.
 #[inline(never)]
 pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value) -> Signal {
-    let control = &mut vm.scheduler.task_mut().control;
+    let task = vm.scheduler.task_mut();
+    let control = &mut *task.control;
     control.entries.pop();
-    let RunningCleanup { pending, values, .. } = control.running.pop().unwrap_or_default();
-    control.unwinding = pending;
-    let unwinds = control.unwinding.is_some();
-    vm.exchange.values = values;
-    vm.close_cleanup_memory();
-    if vm.scheduler.task().flags.attention() {
+    let Some(RunningCleanup { pending, values, .. }) = control.running.pop() else { return Signal::Next };
+    let unwinds = pending.is_some();
+    if unwinds || control.unwinding.is_some() {
+        control.unwinding = pending;
+    }
+    if values.is_empty() {
+        vm.exchange.values.clear();
+    } else {
+        vm.exchange.values = values;
+    }
+    if task.flags.attention() {
         // What waited for the end of the cleanup waits no longer.
         vm.exchange.charges.end_slice();
     }
+    vm.close_cleanup_memory();
     if unwinds { Signal::Unwind } else { Signal::Next }
 }
 

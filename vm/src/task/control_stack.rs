@@ -265,6 +265,19 @@ pub(crate) struct Found {
 }
 
 impl Control {
+    /// Begins to run the cleanup on top of the stack, whose protected form has returned these values.
+    #[inline]
+    pub(crate) fn enter_cleanup(&mut self, values: Vec<Value>) {
+        let bound = self.bound();
+        let index = self.running.len();
+        let Some(entry) = self.entries.last_mut() else { return };
+        self.bindings.truncate(entry.bindings as usize);
+        entry.kind = EntryKind::Running;
+        entry.data = Value::index(index);
+        let entry = self.entries.len() - 1;
+        self.running.push(RunningCleanup { entry, pending: None, values, allowance: None, bound });
+    }
+
     /// Begins to run the cleanup `entry`, on top of the stack. `running` is what it interrupts.
     pub(crate) fn run_cleanup(&mut self, entry: Entry, running: RunningCleanup) {
         let data = Value::index(self.running.len());

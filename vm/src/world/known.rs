@@ -91,6 +91,7 @@ define_known! {
     suspended = keyword "SUSPENDED";
     // Properties under which the machine keeps data on a symbol.
     accessor = esl "%ACCESSOR";
+    resource = esl "%RESOURCE";
     // Results and options that are keywords.
     cases = keyword "CASES";
     functions = keyword "FUNCTIONS";
