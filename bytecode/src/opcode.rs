@@ -198,6 +198,10 @@ macro_rules! for_each_opcode {
             VectorSet = 0x51, "vector-set", effect SetSvref { vector: Reg, index: Reg, value: Reg };
             /// Element `R[index]` of the array `R[array]` of rank 1 becomes `R[value]`.
             ArraySet = 0x53, "array-set", effect SetAref { array: Reg, index: Reg, value: Reg };
+            /// `R[dst] := (svref R[vector] index)`
+            VectorRefInt = 0x66, "vector-ref-int", value Svref { dst: Dst, vector: Reg, index: Index };
+            /// Element `index` of the simple vector `R[vector]` becomes `R[value]`.
+            VectorSetInt = 0x67, "vector-set-int", effect SetSvref { vector: Reg, index: Index, value: Reg };
             /// `R[dst] := (char R[string] R[index])`
             CharRef = 0x57, "char-ref", value Char { dst: Dst, string: Reg, index: Reg };
             /// `R[dst]` := slot `slot` of `R[instance]`, which must be an instance of the class or a

@@ -15,7 +15,7 @@ use crate::arithmetic::{Arithmetic, NumberOrder};
 use crate::emit::in_object;
 use crate::flow::FlowStep;
 use crate::kinds::{Known, is_root};
-use crate::objects::capture;
+use crate::objects::{ElementIndex, capture};
 use crate::translate::Translator;
 
 impl Translator<'_, '_> {
@@ -29,6 +29,7 @@ impl Translator<'_, '_> {
                 | Instr::LoadConst { .. }
                 | Instr::LoadInt { .. }
                 | Instr::VectorRef { .. }
+                | Instr::VectorRefInt { .. }
                 | Instr::Add { .. }
                 | Instr::Sub { .. }
                 | Instr::Mul { .. }
@@ -37,7 +38,9 @@ impl Translator<'_, '_> {
         );
         if !may_join_batch {
             self.close_batch_for(match step.instr {
-                Instr::VectorSet { value, .. } | Instr::ArraySet { value, .. } => Some(value.0),
+                Instr::VectorSet { value, .. }
+                | Instr::VectorSetInt { value, .. }
+                | Instr::ArraySet { value, .. } => Some(value.0),
                 Instr::Return { src } => Some(src.0),
                 _ => None,
             });
@@ -216,11 +219,17 @@ impl Translator<'_, '_> {
             Instr::SetCdr { pair, value } => self.set_half(pair.0, value.0, offset_of!(Cons, cdr)),
 
             Instr::VectorRef { dst, vector, index } => {
-                self.simple_element_ref(dst.0, vector.0, index.0);
+                self.simple_element_ref(dst.0, vector.0, ElementIndex::Register(index.0));
+            }
+            Instr::VectorRefInt { dst, vector, index } => {
+                self.simple_element_ref(dst.0, vector.0, ElementIndex::Number(index.0));
             }
             Instr::ArrayRef { dst, array, index } => self.element_ref(dst.0, array.0, index.0),
             Instr::VectorSet { vector, index, value } => {
-                self.simple_element_set(vector.0, index.0, value.0);
+                self.simple_element_set(vector.0, ElementIndex::Register(index.0), value.0);
+            }
+            Instr::VectorSetInt { vector, index, value } => {
+                self.simple_element_set(vector.0, ElementIndex::Number(index.0), value.0);
             }
             Instr::ArraySet { array, index, value } => self.element_set(array.0, index.0, value.0),
             Instr::CharRef { dst, string, index } => self.char_ref(dst.0, string.0, index.0),

@@ -107,6 +107,7 @@ impl NativeKinds {
                 dst.0
             }
             Instr::VectorRef { dst, .. }
+            | Instr::VectorRefInt { dst, .. }
             | Instr::ArrayRef { dst, .. }
             | Instr::Slot { dst, .. }
             | Instr::Car { dst, .. }
@@ -311,7 +312,8 @@ fn computed(instr: &Instr) -> Option<u8> {
         | Instr::Mul { dst, .. }
         | Instr::Div { dst, .. }
         | Instr::AddInt { dst, .. }
-        | Instr::VectorRef { dst, .. } => Some(dst.0),
+        | Instr::VectorRef { dst, .. }
+        | Instr::VectorRefInt { dst, .. } => Some(dst.0),
         Instr::CallBuiltin { window, builtin, .. } if builtin.0 == Builtin::Sqrt.number() => Some(window.0),
         _ => None,
     }

@@ -13,6 +13,15 @@ use crate::emit::{ELEMENTS, WORD, in_cons, in_object, memory};
 use crate::kinds::Known;
 use crate::translate::Translator;
 
+/// Where an instruction has the index of an element.
+#[derive(Clone, Copy)]
+pub(crate) enum ElementIndex {
+    /// In a register.
+    Register(u8),
+    /// In itself.
+    Number(u8),
+}
+
 impl Translator<'_, '_> {
     /// Follows halves of pairs.
     pub(crate) fn follow(&mut self, dst: u8, list: u8, halves: &[usize]) {
@@ -35,9 +44,10 @@ impl Translator<'_, '_> {
 
     /// An element of a simple vector. What is none, or is not there, fails by the interpreter. One that is
     /// guessed to be a double is kept back, and joins the batch.
-    pub(crate) fn simple_element_ref(&mut self, dst: u8, vector: u8, index: u8) {
+    pub(crate) fn simple_element_ref(&mut self, dst: u8, vector: u8, index: ElementIndex) {
         if self.guess == Some(dst) {
-            let (vector, index, exit) = (self.get(vector), self.operand(index), self.exit_of_batch(AGAIN));
+            let (vector, index) = (self.get(vector), self.index_operand(index));
+            let exit = self.exit_of_batch(AGAIN);
             let element = self.simple_element(vector, index, exit);
             let value = self.load(element, in_object(ELEMENTS as usize));
             let wrong = self.exit_of_batch(GUESSED_WRONG);
@@ -45,10 +55,17 @@ impl Translator<'_, '_> {
             return self.set_double_of(dst, double, value);
         }
         self.close_batch();
-        let (vector, index, exit) = (self.get(vector), self.operand(index), self.exit());
+        let (vector, index, exit) = (self.get(vector), self.index_operand(index), self.exit());
         let element = self.simple_element(vector, index, exit);
         let value = self.load(element, in_object(ELEMENTS as usize));
         self.set(dst, value, Known::Nothing);
+    }
+
+    fn index_operand(&mut self, index: ElementIndex) -> (Ssa, Known) {
+        match index {
+            ElementIndex::Register(register) => self.operand(register),
+            ElementIndex::Number(number) => self.fixnum(i32::from(number)),
+        }
     }
 
     /// As [`Translator::element`], on the way that control takes always. Neither kind nor length of a vector
@@ -69,9 +86,9 @@ impl Translator<'_, '_> {
     }
 
     /// As [`Translator::simple_element_ref`], for an assignment.
-    pub(crate) fn simple_element_set(&mut self, vector: u8, index: u8, value: u8) {
+    pub(crate) fn simple_element_set(&mut self, vector: u8, index: ElementIndex, value: u8) {
         self.make_word(usize::from(value));
-        let (vector, index, exit) = (self.get(vector), self.operand(index), self.exit());
+        let (vector, index, exit) = (self.get(vector), self.index_operand(index), self.exit());
         let (value, known) = self.operand(value);
         let element = self.simple_element(vector, index, exit);
         if known == Known::Double {

@@ -5,6 +5,7 @@
 //!   that each turn executes one conditional jump back. See [`super::loops`] for the shapes that profit.
 //! - Counting: an addition to a counter right before its comparison with a limit becomes one instruction with
 //!   it.
+//! - Joining: registers side by side that become `NIL` one after the other become so in one instruction.
 //! - Segments that control cannot reach are dropped.
 
 use esl_bytecode::opcode::Instr;
@@ -23,6 +24,7 @@ pub(crate) fn improve(graph: &mut Graph) {
     thread(graph);
     drop_unreachable(graph);
     count(graph);
+    join_nils(graph);
 }
 
 /// Lets edges skip empty segments.
@@ -124,6 +126,26 @@ fn rotate(graph: &mut Graph) {
         segment.exit = exit;
         segment.span = span;
         segment.scope = scope;
+    }
+}
+
+/// Joins instructions that load `NIL` into registers side by side.
+fn join_nils(graph: &mut Graph) {
+    for label in &graph.order {
+        graph.segments[label.index()].ops.dedup_by(|op, before| {
+            let (Instr::LoadNil { first: next, count: more }, Instr::LoadNil { first, count }) =
+                (op.instr, &mut before.instr)
+            else {
+                return false;
+            };
+            match count.0.checked_add(more.0) {
+                Some(sum) if first.0.checked_add(count.0) == Some(next.0) => {
+                    count.0 = sum;
+                    true
+                }
+                _ => false,
+            }
+        });
     }
 }
 

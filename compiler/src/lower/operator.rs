@@ -47,6 +47,10 @@ enum OperatorShape {
     Change(fn(Reg, Reg) -> Instr),
     /// As `Change`, with three arguments.
     ChangeAt(fn(Reg, Reg, Reg) -> Instr),
+    /// An element of a simple vector.
+    Element,
+    /// An assignment to one, as `Change`.
+    SetElement,
     List,
     ListStar,
     Identity,
@@ -110,7 +114,7 @@ fn shape(builtin: Builtin, count: usize) -> Option<OperatorShape> {
         (B::Cadr | B::Second, 1) => Unary(|dst, list| Instr::Cadr { dst, list }),
         (B::Cddr, 1) => Unary(|dst, list| Instr::Cddr { dst, list }),
         (B::Cons, 2) => Binary(|dst, car, cdr| Instr::Cons { dst, car, cdr }),
-        (B::Svref, 2) => Binary(|dst, vector, index| Instr::VectorRef { dst, vector, index }),
+        (B::Svref, 2) => Element,
         (B::Char | B::Schar, 2) => Binary(|dst, string, index| Instr::CharRef { dst, string, index }),
         (B::CharEqualExactly, 2) => Binary(|dst, left, right| Instr::CharEq { dst, left, right }),
         (B::Aref, 2) => Binary(|dst, array, index| Instr::ArrayRef { dst, array, index }),
@@ -118,7 +122,7 @@ fn shape(builtin: Builtin, count: usize) -> Option<OperatorShape> {
         (B::Rplacd, 2) => Change(|pair, value| Instr::SetCdr { pair, value }),
         (B::SetCar, 2) => Change(|pair, value| Instr::SetCar { pair, value }),
         (B::SetCdr, 2) => Change(|pair, value| Instr::SetCdr { pair, value }),
-        (B::SetSvref, 3) => ChangeAt(|vector, index, value| Instr::VectorSet { vector, index, value }),
+        (B::SetSvref, 3) => SetElement,
         (B::SetAref, 3) => ChangeAt(|array, index, value| Instr::ArraySet { array, index, value }),
         (B::List, _) => List,
         (B::ListStar, 1..=MAX_DIRECT) => ListStar,
@@ -142,7 +146,9 @@ pub(super) fn takes_literals(core: &Core, builtin: Builtin, arguments: &[NodeId]
             OperatorShape::Binary(_)
             | OperatorShape::Quotient(_)
             | OperatorShape::Change(_)
-            | OperatorShape::ChangeAt(_),
+            | OperatorShape::ChangeAt(_)
+            | OperatorShape::Element
+            | OperatorShape::SetElement,
         ) => true,
         _ => false,
     }
@@ -207,6 +213,10 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 self.emit(instr(object, index, value));
                 self.registers.release(top);
             }
+            (OperatorShape::Element, [vector, index]) => self.element(*vector, *index, dest),
+            (OperatorShape::SetElement, [vector, index, value]) if matches!(dest, Dest::Effect) => {
+                self.set_element(*vector, *index, *value);
+            }
             (OperatorShape::List, _) => self.list(arguments, dest),
             (OperatorShape::ListStar, _) => self.list_star(arguments, dest),
             (OperatorShape::Identity, [form]) => self.single(*form, dest),
@@ -220,6 +230,42 @@ impl<'a> FunctionBuilder<'_, 'a> {
             }
             _ => self.emit_call(CallRoute::Builtin(builtin), arguments, dest),
         }
+    }
+
+    /// Lowers a read of an element of a simple vector.
+    fn element(&mut self, vector: NodeId, index: NodeId, dest: Dest) {
+        let top = self.registers.top();
+        if let Some(index) = self.element_index(index) {
+            let vector = self.operand(vector, &[]);
+            self.registers.release(top);
+            return self.compute(dest, |dst| Instr::VectorRefInt { dst, vector, index });
+        }
+        let (vector, index) = self.operands(vector, index);
+        self.registers.release(top);
+        self.compute(dest, |dst| Instr::VectorRef { dst, vector, index });
+    }
+
+    /// Lowers an assignment to an element of a simple vector.
+    fn set_element(&mut self, vector: NodeId, index: NodeId, value: NodeId) {
+        let top = self.registers.top();
+        if let Some(index) = self.element_index(index) {
+            let (vector, value) = self.operands(vector, value);
+            self.emit(Instr::VectorSetInt { vector, index, value });
+        } else {
+            let vector = self.operand(vector, &[index, value]);
+            let (index, value) = self.operands(index, value);
+            self.emit(Instr::VectorSet { vector, index, value });
+        }
+        self.registers.release(top);
+    }
+
+    /// Returns the index of an element, if it is a literal that fits into an instruction. Where a loop keeps
+    /// it in a register, the fused instructions of the machine want it from there.
+    fn element_index(&mut self, index: NodeId) -> Option<Index> {
+        if self.loaded_literal(index).is_some() {
+            return None;
+        }
+        literal_int(self.core, index).and_then(|index| u8::try_from(index.0).ok()).map(Index)
     }
 
     /// Returns two operands, evaluated in order.

@@ -75,6 +75,9 @@ impl FunctionBuilder<'_, '_> {
     pub(super) fn store_spilled(&mut self, place: Int16, value: Reg) {
         let Some(spill) = &self.spill else { return };
         let vector = spill.register;
+        if let Ok(index) = u8::try_from(place.0) {
+            return self.emit(Instr::VectorSetInt { vector, index: Index(index), value });
+        }
         let index = self.registers.take(1);
         self.emit(Instr::LoadInt { dst: index.into(), value: place });
         self.emit(Instr::VectorSet { vector, index, value });
@@ -85,6 +88,9 @@ impl FunctionBuilder<'_, '_> {
     pub(super) fn load_spilled(&mut self, place: Int16, register: Reg) {
         let Some(spill) = &self.spill else { return };
         let vector = spill.register;
+        if let Ok(index) = u8::try_from(place.0) {
+            return self.emit(Instr::VectorRefInt { dst: register.into(), vector, index: Index(index) });
+        }
         self.emit(Instr::LoadInt { dst: register.into(), value: place });
         self.emit(Instr::VectorRef { dst: register.into(), vector, index: register });
     }

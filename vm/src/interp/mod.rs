@@ -1303,6 +1303,22 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(ArraySet)
                 }
+                LoopOperation::VectorRefInt => {
+                    let (vector, index) = (get!(word.b()), word.c());
+                    if is_simple_vector(vector) && index < (*vector.object_ptr()).len as usize {
+                        set!(word.a(), *element(vector, index));
+                        next!(1);
+                    }
+                    compute!(VectorRefInt)
+                }
+                LoopOperation::VectorSetInt => {
+                    let (vector, index) = (get!(word.a()), word.b());
+                    if is_simple_vector(vector) && index < (*vector.object_ptr()).len as usize {
+                        vm.heap.store(element(vector, index), get!(word.c()));
+                        next!(1);
+                    }
+                    compute!(VectorSetInt)
+                }
                 LoopOperation::CharRef => {
                     let (string, index) = (get!(word.b()), get!(word.c()));
                     if string.is_object() && index.is_fixnum() {

@@ -356,6 +356,8 @@ unsafe fn instruction(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Done {
             Opcode::ArrayRef => compute!(ArrayRef),
             Opcode::VectorSet => compute!(VectorSet),
             Opcode::ArraySet => compute!(ArraySet),
+            Opcode::VectorRefInt => compute!(VectorRefInt),
+            Opcode::VectorSetInt => compute!(VectorSetInt),
             Opcode::CharRef => compute!(CharRef),
             Opcode::Slot => cold::slot(vm, pc, base).into(),
             Opcode::SetSlot => cold::set_slot(vm, pc, base).into(),

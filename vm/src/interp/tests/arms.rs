@@ -323,6 +323,15 @@ const PROGRAMS: &[(&str, &str)] = &[
         ":TYPE-ERROR 2 (INTEGER 0 (2))",
     ),
     (
+        "load-const r0 k10 \n load-int r1 7 \n vector-set-int r0 #1 r1 \n vector-ref-int r2 r0 #1
+         vector-set-int r0 #0 r2 \n return r0",
+        "#(7 7)",
+    ),
+    ("load-const r0 k10 \n vector-ref-int r0 r0 #2 \n return r0", ":TYPE-ERROR 2 (INTEGER 0 (2))"),
+    ("load-const r0 k10 \n vector-set-int r0 #2 r0 \n return r0", ":TYPE-ERROR 2 (INTEGER 0 (2))"),
+    ("load-int r0 5 \n vector-ref-int r0 r0 #0 \n return r0", ":TYPE-ERROR 5 SIMPLE-VECTOR"),
+    ("load-int r0 5 \n vector-set-int r0 #0 r0 \n return r0", ":TYPE-ERROR 5 SIMPLE-VECTOR"),
+    (
         "load-const r0 k9 \n load-int r1 3 \n load-const r2 k8 \n array-set r0 r1 r2 \n return r0",
         ":TYPE-ERROR 3 (INTEGER 0 (3))",
     ),

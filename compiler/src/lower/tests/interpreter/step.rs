@@ -163,6 +163,14 @@ impl Interpreter<'_> {
                 let value = self.element(vector, index).0.borrow().clone();
                 self.set(dst.0, value);
             }
+            Instr::VectorRefInt { dst, vector, index } => {
+                let value = self.element_at(vector, usize::from(index.0)).0.borrow().clone();
+                self.set(dst.0, value);
+            }
+            Instr::VectorSetInt { vector, index, value } => {
+                let value = self.get(value.0);
+                *self.element_at(vector, usize::from(index.0)).0.borrow_mut() = value;
+            }
             Instr::CharRef { dst, string, index } => {
                 let value = simple(B::Char, vec![self.get(string.0), self.get(index.0)])?;
                 self.set(dst.0, value);
@@ -375,9 +383,12 @@ impl Interpreter<'_> {
 
     /// The pair of a vector's element: vectors are lists here, since only the compiler makes them.
     fn element(&mut self, vector: Reg, index: Reg) -> Pair<LoadedFunction> {
-        let (mut rest, Value::Int(index)) = (self.get(vector.0), self.get(index.0)) else {
-            panic!("an index")
-        };
+        let Value::Int(index) = self.get(index.0) else { panic!("an index") };
+        self.element_at(vector, usize::try_from(index).expect("an index"))
+    }
+
+    fn element_at(&mut self, vector: Reg, index: usize) -> Pair<LoadedFunction> {
+        let mut rest = self.get(vector.0);
         for _ in 0..index {
             let Value::Cons(pair) = &rest else { panic!("an index inside") };
             let next = pair.1.borrow().clone();
