@@ -1439,15 +1439,16 @@ macro_rules! for_each_builtin {
             /// before.
             SetFluent = coordination::set_fluent, internal "%SET-FLUENT" ("fluent value")
                 slowly "%SLOW-SET-FLUENT";
-            /// A new record of what this task reads, for a watch or `NIL`.
-            NewReads = coordination::new_reads, internal "%NEW-READS" ("watch");
+            /// A new record of what this task reads, for a watch if one is given.
+            NewReads = coordination::new_reads, internal "%NEW-READS" ("&optional watch");
             /// Notes that a source is read, with the count of its event; whether it was not noted yet.
             NoteSource = coordination::note_read, internal "%NOTE-SOURCE" ("source reads");
             /// The value of a fluent; it is noted as read if the reads are those of this task.
             NotedValue = coordination::noted_value, internal "%NOTED-VALUE" ("fluent reads")
                 slowly "%SLOW-NOTED-VALUE";
             /// Waits for the next signal of what a form has read, or of any event if that is nothing or too
-            /// much; returns at once if there was one since it was read. `what` is for reports.
+            /// much; not if there was one since it was read. `what` is for reports. A new record of what
+            /// this task reads.
             WaitForReads = coordination::wait_for_reads, internal "%WAIT-FOR-READS" ("reads what");
             /// A request of this task, made in a form with the request `outer`, which holds so much of the
             /// resource called `name`; `NIL` if others wait for that, or if there is not enough.

@@ -17,7 +17,7 @@ use crate::vm::Vm;
 use crate::wait::{WaitOptions, event, link};
 
 use super::event::begin_wait;
-use super::expect::exactly;
+use super::expect::{exactly, optional};
 use super::lookup;
 
 /// The fields of a source.
@@ -101,11 +101,16 @@ pub(super) fn set_fluent(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn new_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
+    make_reads(vm, optional(arguments, 0))
+}
+
+/// Creates a record of what this task reads, for a watch or `NIL`.
+fn make_reads(vm: &mut Vm, watch: Value) -> Outcome {
     let any = event::count(&vm.heap, vm.scheduler.any_event);
     let mut fields = [Value::NIL; 6];
     fields[reads::TASK] = vm.scheduler.task().object;
     fields[reads::COUNT] = Value::small(0);
-    fields[reads::WATCH] = arguments[0];
+    fields[reads::WATCH] = watch;
     fields[reads::ANY] = Value::fixnum(any).unwrap_or(Value::NIL);
     Ok(vm.heap.alloc_vector(&fields)?)
 }
@@ -113,37 +118,44 @@ pub(super) fn new_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn noted_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [fluent, reads] = exactly(arguments);
     // Tasks made by the form have copies of its binding.
+    let Some(&[_, value, seen]) = vm.heap.slots(fluent, Kind::SimpleVector) else { return Ok(Value::NIL) };
     if let Some(&[task, _, _, watch]) = vm.heap.slots(reads, Kind::SimpleVector)
         && task == vm.scheduler.task().object
     {
         if watch.is_true() {
             return Err(Exit::Slowly);
         }
-        note_source(vm, fluent, reads)?;
+        if seen != reads {
+            note_source(vm, fluent, reads)?;
+        }
     }
-    Ok(vm.heap.slot_or_nil(fluent, source::VALUE))
+    Ok(value)
 }
 
 pub(super) fn note_read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [source, reads] = exactly(arguments);
-    Ok(Value::boolean(note_source(vm, source, reads)?))
+    let is_new = vm.heap.slot_or_nil(source, source::SEEN) != reads;
+    if is_new {
+        note_source(vm, source, reads)?;
+    }
+    Ok(Value::boolean(is_new))
 }
 
-/// Notes that a form has read a source, with the count of its event. Returns whether it was not noted yet.
-fn note_source(vm: &mut Vm, source: Value, reads: Value) -> Result<bool, Exit> {
-    let Some(&[event, _, seen]) = vm.heap.slots(source, Kind::SimpleVector) else { return Ok(false) };
-    if seen == reads {
-        return Ok(false);
-    }
+/// Notes that a form has read a source, which was not noted yet, with the count of its event.
+#[inline]
+fn note_source(vm: &mut Vm, source: Value, reads: Value) -> Result<(), Exit> {
     vm.scheduler.point_of_read()?;
-    let Some(&[_, sources, sum]) = vm.heap.slots(reads, Kind::SimpleVector) else { return Ok(false) };
-    let sources = vm.heap.cons(source, sources)?;
-    let sum = sum.as_fixnum().unwrap_or(0).wrapping_add(event::count(&vm.heap, event));
-    if let Some([_, noted, count]) = vm.heap.slots_mut::<3>(reads, Kind::SimpleVector) {
-        (*noted, *count) = (sources, Value::fixnum(sum).unwrap_or(Value::small(0)));
-    }
-    vm.heap.slot_set(source, source::SEEN, reads);
-    Ok(true)
+    let heap = &mut vm.heap;
+    let Some(&[_, sources, sum]) = heap.slots(reads, Kind::SimpleVector) else { return Ok(()) };
+    let sum = sum
+        .as_fixnum()
+        .unwrap_or(0)
+        .wrapping_add(event::count(heap, heap.slot_or_nil(source, source::EVENT)));
+    let all = heap.cons(source, sources)?;
+    heap.record_set(reads, Kind::SimpleVector, reads::SOURCES, all);
+    heap.record_set(reads, Kind::SimpleVector, reads::COUNT, Value::fixnum(sum).unwrap_or(Value::small(0)));
+    heap.record_set(source, Kind::SimpleVector, source::SEEN, reads);
+    Ok(())
 }
 
 /// Returns the events whose signals a form is to be evaluated after, with the sum of their counts from before
@@ -171,14 +183,15 @@ pub(super) fn wait_for_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         if link::signalled(&vm.heap, wait).is_none() {
             return vm.scheduler.park_at(wait, None);
         }
+        let next = make_reads(vm, Value::NIL)?;
         vm.scheduler.leave_signalled(&mut vm.heap);
-        return Ok(Value::NIL);
+        return Ok(next);
     }
     vm.scheduler.point()?;
     let options = WaitOptions { what, ..WaitOptions::default() };
     if let Some((event, count)) = only_event(&vm.heap, reads) {
         if event::count(&vm.heap, event) != count {
-            return Ok(Value::NIL);
+            return make_reads(vm, Value::NIL);
         }
         let wait = begin_wait(vm, event, options)?;
         return vm.scheduler.park_at(wait, None);
@@ -187,7 +200,7 @@ pub(super) fn wait_for_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.charge_elements(events.len());
     let now = events.iter().fold(0_i64, |sum, &event| sum.wrapping_add(event::count(&vm.heap, event)));
     if now != count {
-        return Ok(Value::NIL);
+        return make_reads(vm, Value::NIL);
     }
     let events = vm.heap.list(&events)?;
     let wait = begin_wait(vm, events, options)?;

@@ -150,8 +150,10 @@ fn is_one_kept(vm: &Vm, events: Value) -> bool {
 
 /// Takes the oldest signal that an input keeps for which a wait is.
 fn take_for(vm: &mut Vm, wait: Value) -> Result<Option<Value>, Exit> {
-    let (events, what) = link::waited_for(&vm.heap, wait);
-    for event in events.into_iter().filter(|_| what.is_nil()) {
+    if !link::takes(&vm.heap, wait) {
+        return Ok(None);
+    }
+    for event in link::waited_for(&vm.heap, wait).0 {
         if let Some(arguments) = take_kept_by(vm, event)? {
             return Ok(Some(arguments));
         }

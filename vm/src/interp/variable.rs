@@ -62,12 +62,18 @@ pub(super) unsafe fn set_symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Va
 /// `bind`.
 #[inline(never)]
 pub(super) unsafe fn bind(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: V3: the operand is a register of the frame at `base`; V4: the constant is there.
+    // SAFETY: V3: the operand is a register of the frame at `base`; V4: the constant is a symbol.
     unsafe {
         let word = word_at(pc);
         let symbol = constant(base, word.d());
         let value = *base.add(word.a());
         let offset = vm.offset_of(base) as u32;
+        let flags = (*symbol.object_ptr()).flags & (SymbolObject::EVER_BOUND | SymbolObject::CONSTANT);
+        let bindings = &mut vm.scheduler.task_mut().control.bindings;
+        if flags == SymbolObject::EVER_BOUND && !bindings.is_full() {
+            bindings.push(Binding { symbol, value, base: offset });
+            return Signal::Next;
+        }
         match vm.bind(symbol, value, offset) {
             Ok(()) => Signal::Next,
             Err(exit) => Signal::Exit(exit),

@@ -123,6 +123,17 @@ fn wake_waiters(vm: &mut Vm, event: Value, arguments: Value) -> Result<(), Exit>
         event::count_signal(&mut vm.heap, any_event);
         return Ok(());
     }
+    if !any_is_awaited
+        && vm.scheduler.deliveries.is_empty()
+        && let Some(wait) = link::only_wait(&vm.heap, event)
+    {
+        event::count_signal(&mut vm.heap, event);
+        let (by, mut no_cells) = (vm.scheduler.running_number(), Value::NIL);
+        hand_over(vm, wait, (event, by), arguments, &mut no_cells);
+        event::count_signal(&mut vm.heap, any_event);
+        vm.exchange.charge(64);
+        return Ok(());
+    }
     if vm.scheduler.deliveries.is_empty()
         && let Some(keepers) = keepers_if_few(&vm.heap, event)
         && let Some(others) = keepers_if_few(&vm.heap, any_event)

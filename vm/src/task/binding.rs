@@ -131,6 +131,11 @@ impl Bindings {
     /// Returns the value of the newest binding of `symbol`.
     #[inline]
     pub(crate) fn get(&self, symbol: Value) -> Option<Value> {
+        if let Some(newest) = self.all.last()
+            && newest.symbol == symbol
+        {
+            return Some(newest.value);
+        }
         let near = self.all.get(self.covered()..).unwrap_or_default();
         match near.iter().rev().find(|binding| binding.symbol == symbol) {
             Some(binding) => Some(binding.value),

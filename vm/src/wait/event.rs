@@ -44,6 +44,7 @@ pub(crate) fn is_event(heap: &Heap, object: Value) -> bool {
 }
 
 /// Returns how often an event was signalled.
+#[inline]
 pub(crate) fn count(heap: &Heap, event: Value) -> i64 {
     heap.slot_or_nil(event, COUNT).as_fixnum().unwrap_or(0)
 }

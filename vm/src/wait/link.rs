@@ -138,6 +138,13 @@ pub(crate) fn first(heap: &Heap, event: Value) -> Value {
     heap.slot_or_nil(event, event::FIRST)
 }
 
+/// Returns the wait for `event`, if there is just one and it keeps no signals.
+#[inline]
+pub(crate) fn only_wait(heap: &Heap, event: Value) -> Option<Value> {
+    let (wait, next) = wait_and_next(heap, first(heap, event));
+    (next.is_nil() && !keeps(heap, wait)).then_some(wait)
+}
+
 /// Returns the time at which a wait ends by itself, in nanoseconds.
 pub(crate) fn deadline(heap: &Heap, wait: Value) -> Option<u64> {
     heap.slot_or_nil(wait, DEADLINE).as_fixnum().map(|time| time as u64)
@@ -176,7 +183,11 @@ pub(crate) fn waited_for(heap: &Heap, wait: Value) -> (Vec<Value>, Value) {
 /// Returns whether a wait takes what an input has kept: whether it is for the signals themselves, and not to
 /// look at something again.
 pub(crate) fn takes(heap: &Heap, wait: Value) -> bool {
-    waited_for(heap, wait).1.is_nil()
+    let mut link = wait;
+    while heap.is(link, Kind::Wait) {
+        link = heap.slot_or_nil(link, MORE);
+    }
+    link.is_nil()
 }
 
 /// Returns the signal that a wait has got and not handed on: the only one, or the first that it has kept.
