@@ -20,7 +20,8 @@ const SERVER: &str = "(require :http)
     (:get \"/hello/:name\" (name greeting) (format nil \"~a ~a\" (or greeting \"hello\") name))
     (:post \"/echo\" () (values (http:request-body http:*request*) 201 '((\"X-Kind\" . \"echo\"))))
     (:get \"/bytes\" () #(0 255 10))
-    (:get \"/fail\" () (fail :broken))))
+    (:get \"/fail\" () (fail :broken))
+    (:get \"/wrong\" () (car http:*port*))))
 (wait-until *served*)
 (defun url (path) (format nil \"http://127.0.0.1:~a~a\" *served* path))
 ";
@@ -36,7 +37,13 @@ fn client_and_server_talk() {
 (print (nth-value 1 (http:get (url \"/none\"))))
 (print (nth-value 1 (http:put (url \"/echo\") :body \"x\")))
 (print (multiple-value-list (http:get (url \"/fail\") :headers '((\"Accept\" . \"*/*\")))))
-(print (http:get (url \"/hello/again\") :timeout 60))
+(print (nth-value 1 (http:get (url \"/wrong\"))))
+(print (http:get (url \"/hello/again?name=other\") :timeout 60))
+(sockets:with-socket (silent (sockets:listen \"127.0.0.1\" 0))
+  (let ((url (format nil \"http://127.0.0.1:~d/\" (sockets:local-port silent))))
+    (let ((begun (now)))
+      (print (handler-case (with-timeout 20 (http:get url :timeout 0.05))
+               (failure (f) (list (failure-cause f) (< (- (now) begun) 15))))))))
 (dolist (url '(\"ftp://x\" \"http://\" \"http://:80/\" \"http://127.0.0.1:65536/\"))
   (print (handler-case (http:get url) (failure (f) (failure-cause f)))))"
     );
@@ -53,7 +60,9 @@ fn client_and_server_talk() {
         "404",
         "405",
         failed,
+        "500",
         "\"hello again\"",
+        "(:TIMEOUT T)",
         ":HTTP-ERROR",
         ":HTTP-ERROR",
         ":HTTP-ERROR",

@@ -227,6 +227,36 @@ fn a_server_serves_no_more_at_a_time_than_it_is_told_to() {
     check("sockets-limit", text, &["--allow-net"], &["2", "(5 5)"]);
 }
 
+#[test]
+fn a_server_has_a_limit_and_its_port_is_free_when_it_is_left() {
+    let text = "(require :sockets)
+(define-fluent *served* 0)
+(define-fluent *goes-on* nil)
+(defmacro cause (form) `(handler-case ,form (failure (f) (failure-cause f))))
+(let* ((port (sockets:with-socket (l (sockets:listen \"127.0.0.1\" 0)) (sockets:local-port l)))
+       (server (spawn (:daemon t)
+                 (sockets:with-server ((c \"127.0.0.1\" port) :limit 1)
+                   (incf *served*)
+                   (wait-until *goes-on*)
+                   (write-line \"done\" c)))))
+  (flet ((connect ()
+           (loop for c = (cause (sockets:connect \"127.0.0.1\" port))
+                 until (streamp c) do (sleep 0.01)
+                 finally (return c))))
+    (let ((one (connect)) (other (connect)))
+      (wait-until (= *served* 1))
+      ;; Time for the one that should not be served.
+      (sleep 0.05)
+      (print *served*)
+      (setq *goes-on* t)
+      (print (list (read-line one) (read-line one nil :closed) (read-line other)))))
+  (abort-task server)
+  (wait-for-task server)
+  (print (cause (sockets:connect \"127.0.0.1\" port))))";
+    let expected = ["1", "(\"done\" :CLOSED \"done\")", ":CONNECTION-REFUSED"];
+    check("sockets-with-server", text, &["--allow-net=127.0.0.1"], &expected);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_thousand_connections_are_served_by_one_program() {

@@ -12,6 +12,7 @@ const TESTS: &str = "
 (deftest unchecked (double 1))
 (deftest failing (is t) (fail :lost 'in 'space))
 (deftest expected :expect-failure :lost (fail :lost))
+(deftest other-failure :expect-failure :lost (fail :found))
 (deftest unlucky :seeds 20 (is (choose t t (not (eql (length (list-tasks)) 1)))))
 (deftest waiting (is t) (wait-for-event (make-event 'never)))
 (deftest leaving (is t) (exit 7))
@@ -47,13 +48,14 @@ fn failures_are_shown_with_what_repeats_them() {
         "  FAILED  UNCHECKED, seed 0: it has no check: use IS, SIGNALS or FAILS\n",
         "  FAILED  FAILING, seed 0: a failure has left it\n          A failure of cause :LOST with",
         "  passed  EXPECTED\n",
+        "  FAILED  OTHER-FAILURE, seed 0: a check did not hold\n          A failure :LOST was expected",
         "  FAILED  UNLUCKY, seed ",
         "  FAILED  WAITING, seed 0: it waits for what cannot come\n          Deadlock:",
         "  FAILED  LEAVING, seed 0: it has ended the run with the status 7\n",
         "  FAILED  RACING: under one of ",
         "  passed  LEFT-BEHIND\n",
         "  FAILED  ENDLESS, seed 0: its budget of ticks is spent",
-        "\n3 passed, 8 failed\n",
+        "\n3 passed, 9 failed\n",
     ] {
         assert!(output.contains(line), "{line} is not in\n{output}");
     }
@@ -62,6 +64,9 @@ fn failures_are_shown_with_what_repeats_them() {
     let seed = seed.unwrap_or_else(|| panic!("no seed in\n{output}"));
     let again = test(&folder, &["tests.esl", "--filter", "UNLUCKY", "--seed", seed]);
     assert_eq!(again.0, Some(1), "{}", again.1);
+    // A seed that is given is the only one.
+    let other = test(&folder, &["tests.esl", "--filter", "UNLUCKY", "--seed", "0"]);
+    assert_eq!(other.0, Some(0), "{}", other.1);
 }
 
 #[test]

@@ -139,6 +139,24 @@ fn a_second_interrupt_cuts_the_end_short_and_names_what_is_left() {
 }
 
 #[test]
+fn a_second_signal_that_is_no_interrupt_leaves_the_cleanups_their_time() {
+    let text = "(format t \"begun~%\")
+                (finish-output)
+                (unwind-protect (loop (sleep 1))
+                  (format t \"stowing~%\")
+                  (finish-output)
+                  (sleep 0.3)
+                  (format t \"stowed~%\"))";
+    let mut running = Running::start("not-cut", text);
+    running.send("-TERM");
+    assert_eq!(running.line(), "stowing");
+    running.send("-TERM");
+    running.send("-HUP");
+    let ended = running.end();
+    assert_eq!((ended.status, &*ended.output), (Some(143), "stowed\n"), "{}", ended.errors);
+}
+
+#[test]
 fn the_end_of_a_run_has_the_time_that_is_given() {
     let text = "(spawn (:name 'arm) (unwind-protect (loop (sleep 1)) (sleep 100) (princ 'never)))
                 (wait-for-event (make-event))";

@@ -74,9 +74,31 @@ fn a_program_whose_call_is_left_is_ended_and_others_go_on() {
 (let ((p (process:launch-program '(\"sh\" \"-c\" \"exit 7\"))))
   (print (list (process:wait-process p) (process:process-alive-p p))))
 (let ((p (process:launch-program '(\"sleep\" \"1000\"))))
-  (print (list (process:process-alive-p p) (process:end-process p) (process:process-alive-p p))))";
-    let expected = [":ABORTED", ":ABORTED", "FIRST", "\"stopped\"", "(7 NIL)", "(T 143 NIL)"];
+  (print (list (process:process-alive-p p) (process:end-process p) (process:process-alive-p p))))
+(let ((p (process:launch-program '(\"sh\" \"-c\" \"trap '' TERM; echo > begun; exec sleep 20\"))))
+  (loop until (probe-file \"begun\") do (sleep 0.01))
+  (print (process:end-process p)))";
+    let expected = [":ABORTED", ":ABORTED", "FIRST", "\"stopped\"", "(7 NIL)", "(T 143 NIL)", "137"];
     check("process-left", text, &["--allow-run=sh,sleep"], &expected);
+}
+
+#[cfg(unix)]
+#[test]
+fn programs_have_the_environment_that_there_is_and_what_is_added() {
+    let text = "(require :process)
+(defvar *command* '(\"sh\" \"-c\" \"echo $ESL_GIVEN $ESL_ADDED; pwd -P | sed 's,.*/,,'\"))
+(defvar *options* '(:environment ((\"ESL_ADDED\" . \"added\")) :directory \"folder\"))
+(ensure-directories-exist \"folder/\")
+(print (apply #'process:run-program *command* :output :lines *options*))
+(with-open-stream (s (process:process-output
+                       (apply #'process:launch-program *command* :output :stream *options*)))
+  (print (list (read-line s) (read-line s))))";
+    let folder = Folder::with("process-environment", &[("main.esl", text)]);
+    let mut command = eslvm(&["run", "--allow-run=sh", "main.esl"]);
+    let done = process::run(command.current_dir(folder.path()).env("ESL_GIVEN", "given"), "");
+    let output = done.quiet_output().expect("nothing is wrong");
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    assert_eq!(lines, ["(\"given added\" \"folder\")"; 2]);
 }
 
 #[test]
