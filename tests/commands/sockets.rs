@@ -257,6 +257,25 @@ fn a_server_has_a_limit_and_its_port_is_free_when_it_is_left() {
     check("sockets-with-server", text, &["--allow-net=127.0.0.1"], &expected);
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_connection_that_nobody_answers_ends_in_time() {
+    // A listener whose queue is full lets others wait.
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
+    let address = listener.local_addr().expect("it is bound");
+    let patience = std::time::Duration::from_millis(200);
+    let queue: Vec<TcpStream> =
+        std::iter::from_fn(|| TcpStream::connect_timeout(&address, patience).ok()).take(10_000).collect();
+    assert!(queue.len() < 10_000, "the queue is never full");
+    let text = format!(
+        "(require :sockets)
+(print (handler-case (sockets:connect \"127.0.0.1\" {} :timeout 0.1)
+         (failure (f) (failure-cause f))))",
+        address.port()
+    );
+    check("sockets-no-answer", &text, &["--allow-net"], &[":TIMEOUT"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_thousand_connections_are_served_by_one_program() {
