@@ -11,11 +11,48 @@ use super::call::Failure;
 use super::operation::Operation;
 use crate::data::Data;
 
-/// A future that an executor is to run to its end.
-pub type HostFuture = Pin<Box<dyn Future<Output = ()> + Send>>;
+/// The future of an operation, which an executor is to run to its end.
+pub struct HostFuture(Pin<Box<dyn Future<Output = ()> + Send>>);
 
 /// Runs futures to their ends, somewhere: on tokio, for one, by `move |job| drop(handle.spawn(job))`.
 pub type Executor = Arc<dyn Fn(HostFuture) + Send + Sync>;
+
+impl HostFuture {
+    /// Polls the future where the caller is, and returns it unless it has ended. An executor that does so
+    /// first hands on only what has to wait: an operation that is ready at once then costs no change of
+    /// threads. Meanwhile the engine waits, and no task runs.
+    ///
+    /// ```
+    /// use esl::Engine;
+    ///
+    /// let runtime = tokio::runtime::Builder::new_current_thread().build()?;
+    /// let mut engine = Engine::new()?.with_executor(|job| {
+    ///     if let Some(job) = job.poll_once() {
+    ///         tokio::spawn(job);
+    ///     }
+    /// });
+    /// engine.define_async("AREA", "(width height)", "Measures.", |call| async move {
+    ///     Ok(call.get::<f64>("width")? * call.get::<f64>("height")?)
+    /// })?;
+    /// let area = engine.begin("(area 2 3)");
+    /// runtime.block_on(engine.run_async());
+    /// assert_eq!(area.wait()?.as_float(), Some(6.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use = "a future that is dropped has its operation fail"]
+    pub fn poll_once(mut self) -> Option<HostFuture> {
+        let polled = self.0.as_mut().poll(&mut Context::from_waker(Waker::noop()));
+        polled.is_pending().then_some(self)
+    }
+}
+
+impl Future for HostFuture {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+        self.0.as_mut().poll(context)
+    }
+}
 
 /// The future of an operation: ends with the future of its values, or when the operation is cancelled.
 struct RunningFuture<F> {
@@ -73,7 +110,7 @@ where
             waker.wake();
         }
     });
-    Box::pin(RunningFuture { future: Some(Box::pin(future)), operation: Some(operation), waker })
+    HostFuture(Box::pin(RunningFuture { future: Some(Box::pin(future)), operation: Some(operation), waker }))
 }
 
 /// A job on the engine's own thread; waking it puts it into the queue of the thread again.
@@ -110,7 +147,7 @@ fn start_thread() -> Sender<Arc<QueuedJob>> {
             let waker = Waker::from(next.clone());
             let mut place = next.job.lock().unwrap_or_else(PoisonError::into_inner);
             let Some(job) = place.as_mut() else { continue };
-            if job.as_mut().poll(&mut Context::from_waker(&waker)).is_ready() {
+            if Pin::new(job).poll(&mut Context::from_waker(&waker)).is_ready() {
                 *place = None;
             }
         }

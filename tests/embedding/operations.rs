@@ -231,6 +231,74 @@ fn handles_are_events_and_tell_what_has_become_of_the_operation() {
 }
 
 #[test]
+fn an_executor_that_polls_once_gets_only_what_has_to_wait() {
+    let host = RealHost::new(Vec::new()).with_screen(Box::new(|_| Ok(())));
+    let engine = Engine::with(Config::default(), Box::new(host)).expect("there is room for the library");
+    let handed_on = Arc::new(Mutex::new(Vec::new()));
+    let waiting = handed_on.clone();
+    let mut engine = engine.with_executor(move |job| {
+        let left = job.poll_once();
+        waiting.lock().expect("no panic").extend(left);
+    });
+    let here = std::thread::current().id();
+    let async_ready = move |call: Call| async move {
+        assert_eq!(std::thread::current().id(), here);
+        call.get::<i64>("x")
+    };
+    engine.define_async("READY", "(x)", "", async_ready).expect("it compiles");
+    engine
+        .define_async("EXPLODE", "()", "", |_| async { if true { panic!("broken") } else { Ok(()) } })
+        .expect("it compiles");
+    let (go, gone) = channel();
+    let gone = Arc::new(Mutex::new(gone));
+    engine
+        .define_async("LATER", "()", "", move |_| {
+            let gone = gone.clone();
+            std::future::poll_fn(move |_| match gone.lock().expect("no panic").try_recv() {
+                Ok(value) => std::task::Poll::Ready(Ok::<i64, Failure>(value)),
+                Err(_) => std::task::Poll::Pending,
+            })
+        })
+        .expect("it compiles");
+    check(&mut engine, "(list (ready 1) (ready 2))", "(1 2)");
+    check(&mut engine, "(handler-case (ready \"x\") (type-error () 'refused))", "REFUSED");
+    check(&mut engine, "(handler-case (explode) (failure (f) (failure-cause f)))", ":HOST-PANIC");
+    assert_eq!(handed_on.lock().expect("no panic").len(), 0);
+    check(&mut engine, "(progn (defvar *later* (start (later))) (operation-status *later*))", ":PENDING");
+    let job = handed_on.lock().expect("no panic").pop().expect("it waits");
+    go.send(7).expect("the future is there");
+    assert!(job.poll_once().is_none());
+    check(&mut engine, "(operation-result *later*)", "7");
+    // One that is left while nobody polls it is dropped when it is polled, and one that is dropped fails.
+    let left = "(handler-case (with-timeout 0.01 (unwind-protect (later) (give-up)))
+                  (failure (f) (failure-cause f)))";
+    let jobs = handed_on.clone();
+    engine
+        .define("GIVE-UP", "()", "Nothing.", move |_| {
+            assert_eq!(jobs.lock().expect("no panic").len(), 0);
+            Ok(())
+        })
+        .expect("it compiles");
+    let jobs = handed_on.clone();
+    let poller = std::thread::spawn(move || {
+        loop {
+            let job = jobs.lock().expect("no panic").pop();
+            match job.map(esl::engine::HostFuture::poll_once) {
+                Some(None) => break,
+                Some(Some(job)) => jobs.lock().expect("no panic").push(job),
+                None => std::thread::sleep(Duration::from_millis(1)),
+            }
+        }
+    });
+    check(&mut engine, left, ":TIMEOUT");
+    poller.join().expect("it does not panic");
+    check(&mut engine, "(progn (setq *later* (start (later))) (operation-status *later*))", ":PENDING");
+    handed_on.lock().expect("no panic").clear();
+    let lost = "(handler-case (operation-result *later*) (failure (f) (failure-cause f)))";
+    check(&mut engine, lost, ":OPERATION-DROPPED");
+}
+
+#[test]
 fn code_of_the_host_that_misbehaves_is_a_failure() {
     let mut engine = engine();
     let dropping = |operation: Operation| drop(operation);
