@@ -6,7 +6,9 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Command, Stdio};
 
 use esl_conformance::process::{self, finish, start};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{ControlModes, InputModes};
 
 use crate::eslvm;
 use crate::folder::Folder;
@@ -21,31 +23,53 @@ fn a_serial_line_is_a_stream() {
 (defmacro cause (form) `(print (handler-case ,form (failure (f) (list (failure-cause f) (failure-arguments f))))))
 (defvar *path* (first (command-line-arguments)))
 (spawn (:name 'other :daemon t) (loop (sleep 0.001)))
-(serial:with-serial-port (port *path* :baud 115200)
+(serial:with-serial-port (port *path* :baud 115200 :stop-bits 2 :flow-control :software)
   (format port \"ping~%\")
   (print (list (read-line port) (read-byte port) (read-char port)))
   (write-sequence (coerce '(255 0 10) '(vector (unsigned-byte 8))) port)
   (print (handler-case (with-timeout 0.01 (read-char port)) (failure (f) (failure-cause f)))))
+(print (catch 'out (serial:with-serial-port (port *path*) (format port \"pong~%\") (finish-output port) (throw 'out 'thrown))))
+(print (read-line))
 (cause (serial:open-serial-port \"/dev/esl-no-such-line\"))
 (cause (car (list (handler-case (serial:open-serial-port \"esl-no-such-line\") (failure (f) (failure-cause f))))))";
     let folder = Folder::with("serial", &[("main.esl", text)]);
     let link = std::fs::canonicalize(&name).expect("it is there").display().to_string();
     let missing = folder.join("esl-no-such-line");
     let mut command = eslvm(&["run", &format!("--allow-serial={link},{missing}"), "main.esl", &name]);
-    let child = start(command.current_dir(folder.path()));
+    let mut child = start(command.current_dir(folder.path()));
     let mut other_end = BufReader::new(File::from(other_end));
     let mut line = String::new();
     other_end.read_line(&mut line).expect("it is written");
     assert_eq!(line, "ping\n");
+    // A terminal keeps these settings, and has no others.
+    let settings = rustix::termios::tcgetattr(other_end.get_ref()).expect("it is a terminal");
+    assert_eq!((settings.input_speed(), settings.output_speed()), (115_200, 115_200));
+    assert!(settings.control_modes.contains(ControlModes::CSTOPB));
+    assert!(settings.input_modes.contains(InputModes::IXON | InputModes::IXOFF));
     other_end.get_mut().write_all("pöng\n\u{7}x".as_bytes()).expect("it is read");
     let mut bytes = [0; 3];
     other_end.read_exact(&mut bytes).expect("it is written");
     assert_eq!(bytes, [255, 0, 10]);
+    // Of a port that is closed, by a throw too, the other end is told.
+    let mut rest = Vec::new();
+    while !rest.ends_with(b"pong\n") {
+        assert!(child.try_wait().is_ok_and(|end| end.is_none()), "it has ended after {rest:?}");
+        let mut part = [0; 9];
+        match other_end.read(&mut part) {
+            Ok(count) => rest.extend(&part[..count]),
+            // Between the first time and the second the line is closed.
+            Err(_) => std::thread::sleep(std::time::Duration::from_millis(1)),
+        }
+    }
+    let mut events = [PollFd::new(other_end.get_ref(), PollFlags::HUP)];
+    let patience = Timespec { tv_sec: 60, tv_nsec: 0 };
+    assert_eq!(poll(&mut events, Some(&patience)), Ok(1), "the port is not closed");
+    child.stdin.as_mut().expect("it is a pipe").write_all(b"go on\n").expect("it is read");
     let output = finish(child).quiet_output().expect("nothing is wrong");
     let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
     let refused =
         "(:PERMISSION-DENIED (:SERIAL \"/dev/esl-no-such-line\" \"--allow-serial=/dev/esl-no-such-line\"))";
-    assert_eq!(lines, ["(\"pöng\" 7 #\\x)", ":TIMEOUT", refused, ":SERIAL-ERROR"]);
+    assert_eq!(lines, ["(\"pöng\" 7 #\\x)", ":TIMEOUT", "THROWN", "\"go on\"", refused, ":SERIAL-ERROR"]);
 }
 
 const SERVER: &str = "

@@ -1,6 +1,7 @@
 //! MQTT against a broker, if there is one on this machine.
 #![cfg(unix)]
 
+use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -112,7 +113,6 @@ fn messages_go_through_a_broker() {
 /// Starts a peer that takes connections, and answers the first packet of each with `answer` and the second
 /// one with `next`; then it closes the connection, or says no more if it `stays`.
 fn start_peer(answer: &'static [u8], next: &'static [u8], stays: bool) -> u16 {
-    use std::io::{Read, Write};
     let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
     let port = listener.local_addr().expect("it has an address").port();
     std::thread::spawn(move || {
@@ -137,6 +137,97 @@ fn start_peer(answer: &'static [u8], next: &'static [u8], stays: bool) -> u16 {
 /// What a peer answers first and second, whether it stays, the seconds that opening a client and subscribing
 /// may take, and what comes of it.
 type PeerCase = (&'static [u8], &'static [u8], bool, (&'static str, &'static str), &'static str);
+
+/// Reads a packet: its first byte, and what follows its length. Returns nothing at the end.
+fn read_packet(stream: &mut TcpStream) -> Option<(u8, Vec<u8>)> {
+    let mut byte = [0];
+    stream.read_exact(&mut byte).ok()?;
+    let first = byte[0];
+    let mut length = 0;
+    for shift in (0..28).step_by(7) {
+        stream.read_exact(&mut byte).ok()?;
+        length |= usize::from(byte[0] & 127) << shift;
+        if byte[0] < 128 {
+            break;
+        }
+    }
+    let mut rest = vec![0; length];
+    stream.read_exact(&mut rest).ok()?;
+    Some((first, rest))
+}
+
+/// Each option reaches the broker as the protocol has it, and each answer the program.
+#[test]
+fn a_client_says_what_its_options_say() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
+    let port = listener.local_addr().expect("it has an address").port().to_string();
+    // For each packet that comes in: what follows its number, the answer before the number, and what is sent
+    // after the number.
+    let broker = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("a client comes");
+        let mut packets = Vec::new();
+        while let Some((first, rest)) = read_packet(&mut stream) {
+            let number = |at: usize| rest.get(at..at + 2).unwrap_or_default().to_vec();
+            let answer: Vec<u8> = match (first, packets.len()) {
+                (0x10, _) => b"\x20\x02\x00\x00".to_vec(),
+                // The first subscription is refused, the others granted.
+                (0x82, 1) => [&b"\x90\x03"[..], &number(0), b"\x80"].concat(),
+                (0x82, _) => [&b"\x90\x03"[..], &number(0), b"\x01"].concat(),
+                // Before the acknowledgement come four messages of which two have room, and one of another topic.
+                (0x33, _) => {
+                    let texts = ["1", "2", "3", "4"]
+                        .map(|text| [&b"\x30\x04\x00\x01a"[..], text.as_bytes()].concat());
+                    [&texts.concat()[..], b"\x30\x04\x00\x01bz\x40\x02", &number(3)].concat()
+                }
+                (0x34, _) => [&b"\x50\x02"[..], &number(3)].concat(),
+                (0x62, _) => [&b"\x70\x02"[..], &number(0)].concat(),
+                _ => Vec::new(),
+            };
+            // The client may have gone.
+            drop(stream.write_all(&answer));
+            packets.push((first, rest));
+        }
+        packets
+    });
+    let text = "(require :mqtt)
+(handler-case
+    (mqtt:with-client (c \"127.0.0.1\" (parse-integer (first (command-line-arguments)))
+                         :id \"rover\" :keep-alive 77 :user \"me\" :password \"word\"
+                         :will (list \"w\" (vector 0 200) :qos 2 :retain t))
+      (print (handler-case (mqtt:subscribe c \"x\") (failure (f) (failure-cause f))))
+      (let ((a (mqtt:subscribe c \"a\" :qos 1 :capacity 2 :when-full :drop-newest))
+            (b (mqtt:subscribe c \"b\" :qos 2)))
+        (mqtt:publish c \"t\" (vector 1 255) :qos 1 :retain t)
+        (mqtt:publish c \"t\" \"é\" :qos 2)
+        (mqtt:publish c \"t\" \"\")
+        (print (multiple-value-list (wait-for-event b)))
+        (dotimes (i 2) (print (multiple-value-list (wait-for-event a))))
+        (fail :general-failure)))
+  (failure (f) (print (failure-cause f))))";
+    let folder = Folder::with("mqtt-options", &[("main.esl", text)]);
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &port]);
+    let output = process::run(command.current_dir(folder.path()), "").quiet_output();
+    let output = output.expect("nothing is wrong");
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let expected = [":MQTT-ERROR", "(\"b\" \"z\" NIL)", "(\"a\" \"1\" NIL)", "(\"a\" \"2\" NIL)", ":GENERAL-FAILURE"];
+    assert_eq!(lines, expected);
+    let packets = broker.join().expect("it does not panic");
+    // User, password, a will that is kept at level 2, and no session from before.
+    let connect = b"\0\x04MQTT\x04\xf6\0\x4d\0\x05rover\0\x01w\0\x02\0\xc8\0\x02me\0\x04word";
+    let expected: [(u8, &[u8]); 9] = [
+        (0x10, connect),
+        (0x82, b"\0\x01\0\x01x\0"),
+        (0x82, b"\0\x02\0\x01a\x01"),
+        (0x82, b"\0\x03\0\x01b\x02"),
+        (0x33, b"\0\x01t\0\x04\x01\xff"),
+        (0x34, "\0\x01t\0\x05é".as_bytes()),
+        (0x62, b"\0\x05"),
+        (0x30, b"\0\x01t"),
+        (0xe0, b""),
+    ];
+    let expected = expected.map(|(first, rest)| (first, rest.to_vec()));
+    assert_eq!(packets, expected);
+}
 
 /// What is no broker, and what is one for a while only, are failures with causes; nothing hangs.
 #[test]
