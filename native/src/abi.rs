@@ -49,6 +49,11 @@ pub type NativeSetValueOf = unsafe extern "C" fn(*mut NativeContext, u64, u64);
 /// looks at no frame.
 pub type NativeCons = unsafe extern "C" fn(*mut NativeContext, u64, u64) -> u64;
 
+/// Function of the machine that does what the builtin of an instruction does in a hash table: with a key, the
+/// table and what else the builtin is given; without effect, and with the word of `Value::UNBOUND`, if that
+/// takes more. It looks at no frame.
+pub type NativeLookup = unsafe extern "C" fn(*mut NativeContext, u64, u64, u64, u64) -> u64;
+
 /// Machine code of a function: the frame, and the place of entry: 0 for the first instruction, and the
 /// numbers from 1 on for loop instructions.
 pub type NativeEntry = unsafe extern "C" fn(*mut NativeContext, *mut u64, u64) -> NativeReply;
@@ -95,6 +100,12 @@ pub struct NativeContext {
     pub unbind: NativeHelper,
     /// Makes a pair.
     pub cons: NativeCons,
+    /// Finds the value of a key: with what it is if the table has none.
+    pub value_of_key: NativeLookup,
+    /// Sets the value of a key that the table has.
+    pub set_value_of_key: NativeLookup,
+    /// Adds to the value of a key that the table has, a fixnum: with what it would be, and what is added.
+    pub add_to_value_of_key: NativeLookup,
 }
 
 /// How a function of machine code was left.

@@ -6,12 +6,14 @@ use std::mem::offset_of;
 use cranelift_codegen::ir::InstBuilder;
 use cranelift_codegen::ir::condcodes::IntCC;
 use esl_bytecode::opcode::{Instr, RegisterAccess};
+use esl_bytecode::operand::Want;
 use esl_heap::Value;
 use esl_heap::heap::Kind;
 use esl_heap::heap::layout::{Boxed, Cons};
 
 use crate::abi::NativeContext;
 use crate::arithmetic::{Arithmetic, NumberOrder};
+use crate::calls::lookup_of;
 use crate::emit::in_object;
 use crate::flow::FlowStep;
 use crate::kinds::{Known, is_root};
@@ -297,6 +299,12 @@ impl Translator<'_, '_> {
             }
             Instr::CallSelf { window, want, .. } => self.call_self(window.0, want, step.next),
             Instr::CallBuiltin { window, .. } if is_root(&step.instr, &self.known) => self.root(window.0),
+            Instr::CallBuiltin { window, count, want: Want::ONE, builtin } => {
+                match lookup_of(builtin.0, count.0) {
+                    Some(helper) => self.lookup(window.0, count.0, helper),
+                    None => self.call_builtin(window.0, Want::ONE),
+                }
+            }
             Instr::CallBuiltin { window, want, .. } => self.call_builtin(window.0, want),
             Instr::TailCall { window, count, .. } => self.tail_call_given(window.0, count.0),
             Instr::TailCallGlobal { window, count, symbol } => {

@@ -54,6 +54,7 @@ pub(crate) struct Translator<'a, 'f> {
     pub(crate) helper_signature: SigRef,
     pub(crate) store_signature: SigRef,
     pub(crate) read_signature: SigRef,
+    pub(crate) lookup_signature: SigRef,
     pub(crate) entry_signature: SigRef,
     /// Word of the instruction that is translated.
     pub(crate) at: usize,
@@ -82,7 +83,7 @@ impl<'a, 'f> Translator<'a, 'f> {
             b.import_signature(signature)
         };
         let (helper, store, entry) = (signature(3, 1), signature(3, 0), signature(3, 2));
-        let read = signature(2, 1);
+        let (read, lookup) = (signature(2, 1), signature(5, 1));
         let variables: Vec<Variable> = (0..source.registers).map(|_| b.declare_var(types::I64)).collect();
         let doubles: Vec<Variable> = (0..source.registers).map(|_| b.declare_var(types::F64)).collect();
         let first = b.create_block();
@@ -113,6 +114,7 @@ impl<'a, 'f> Translator<'a, 'f> {
             helper_signature: helper,
             store_signature: store,
             read_signature: read,
+            lookup_signature: lookup,
             entry_signature: entry,
             at: 0,
             next: 0,

@@ -209,7 +209,8 @@ fn a_client_says_what_its_options_say() {
     let output = process::run(command.current_dir(folder.path()), "").quiet_output();
     let output = output.expect("nothing is wrong");
     let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    let expected = [":MQTT-ERROR", "(\"b\" \"z\" NIL)", "(\"a\" \"1\" NIL)", "(\"a\" \"2\" NIL)", ":GENERAL-FAILURE"];
+    let expected =
+        [":MQTT-ERROR", "(\"b\" \"z\" NIL)", "(\"a\" \"1\" NIL)", "(\"a\" \"2\" NIL)", ":GENERAL-FAILURE"];
     assert_eq!(lines, expected);
     let packets = broker.join().expect("it does not panic");
     // User, password, a will that is kept at level 2, and no session from before.

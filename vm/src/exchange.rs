@@ -4,10 +4,17 @@
 //! else it has to say (the failure behind an [`Exit::Raise`], the values behind an [`Exit::Values`], the call
 //! behind an [`Exit::Call`], and what its work has cost) waits here until the interpreter takes it.
 
+use crate::heap::Heap;
+use crate::lookup::{Found, Lookups, STEPS_FOR_NOTHING};
 use crate::raise::{Arguments, Exit, Expected, Raised};
 use crate::saved_pc::SavedPc;
+use crate::table::Table;
 use crate::value::Value;
 use crate::world::load::LoadError;
+
+/// Elements, or steps of a search, that are charged as one tick.
+const ELEMENTS: usize = 16;
+const _: () = assert!(STEPS_FOR_NOTHING <= ELEMENTS);
 
 /// Charges of builtins: ticks beside those of their calls, and whether the slice is to end.
 ///
@@ -55,46 +62,6 @@ impl Charges {
     }
 }
 
-/// The entry that was found last in a hash table, by which the next one is guessed.
-///
-/// A key is often the one that was looked up last, as in `(push item (gethash key table))`. And keys that are
-/// integers were often entered in order: their entries lie at one distance from them.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LastLookup {
-    key: Value,
-    entry: usize,
-    /// Number of the entry, minus the key if that is an integer.
-    distance: i64,
-    /// Whether the search before led to an entry at the same distance.
-    is_steady: bool,
-}
-
-impl Default for LastLookup {
-    fn default() -> LastLookup {
-        LastLookup { key: Value::UNBOUND, entry: 0, distance: 0, is_steady: false }
-    }
-}
-
-impl LastLookup {
-    /// Returns the number of the entry that probably has `key`.
-    #[inline(always)]
-    pub(crate) fn guess(&self, key: Value) -> Option<usize> {
-        if self.is_steady
-            && let Some(n) = key.as_fixnum()
-        {
-            return Some((n + self.distance) as usize);
-        }
-        if self.key == key { Some(self.entry) } else { None }
-    }
-
-    /// Notes that a search for `key` led to `entry`.
-    #[inline(always)]
-    pub(crate) fn note(&mut self, key: Value, entry: usize) {
-        let distance = entry as i64 - key.as_fixnum().unwrap_or(0);
-        *self = LastLookup { key, entry, distance, is_steady: distance == self.distance };
-    }
-}
-
 /// Side channel between the interpreter and builtins.
 pub(crate) struct Exchange {
     /// The value list: all values of the form that was evaluated last, where they are wanted.
@@ -103,8 +70,8 @@ pub(crate) struct Exchange {
     pub(crate) raised: Option<Raised>,
     /// Call requested by a builtin: the function, then its arguments.
     pub(crate) requested_call: Vec<Value>,
-    /// Entry found last in a hash table.
-    pub(crate) last_lookup: LastLookup,
+    /// What searches in hash tables have found lately.
+    pub(crate) lookups: Lookups,
     /// Charges of builtins, until the interpreter takes them.
     pub(crate) charges: Charges,
     /// Place and time of the last collection for want of room; a second one there would not help.
@@ -118,7 +85,7 @@ impl Exchange {
             values: Vec::new(),
             raised: None,
             requested_call: Vec::new(),
-            last_lookup: LastLookup::default(),
+            lookups: Lookups::default(),
             charges: Charges::default(),
             collected_at: None,
         }
@@ -249,7 +216,16 @@ impl Exchange {
     /// copied or filled: a tick for each 16. Each takes a few nanoseconds, as they come from memory.
     #[inline]
     pub(crate) fn charge_elements(&mut self, count: usize) {
-        self.charges.add(count as u64 / 16);
+        self.charges.add(count as u64 / ELEMENTS as u64);
+    }
+
+    /// Notes a search in a hash table, and charges for it.
+    #[inline(always)]
+    pub(crate) fn note_lookup(&mut self, heap: &Heap, table: Table, key: Value, found: &Found) {
+        if found.steps != 0 {
+            self.charge_elements(found.steps);
+        }
+        self.lookups.note(heap, table, key, found);
     }
 
     /// Requests a call in the place of the builtin, which returns [`Exit::Call`].

@@ -38,6 +38,7 @@ mod environment;
 mod exchange;
 mod fused;
 mod interp;
+mod lookup;
 mod number;
 mod outside;
 mod report;

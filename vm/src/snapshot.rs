@@ -18,9 +18,10 @@ use crate::canary::Canary;
 use crate::config::Config;
 use crate::database::Database;
 use crate::embedder::Embedder;
-use crate::exchange::{Charges, Exchange, LastLookup};
+use crate::exchange::{Charges, Exchange};
 use crate::heap::HeapImage;
 use crate::host::{Console, HostState};
+use crate::lookup::Lookups;
 use crate::outside::{Operations, Outside};
 use crate::saved_pc::SavedPc;
 use crate::schedule::Scheduler;
@@ -58,7 +59,7 @@ struct SavedOutside {
 /// What lies in the exchange between two turns.
 struct SavedExchange {
     values: Vec<Value>,
-    last_lookup: LastLookup,
+    lookups: Lookups,
     collected_at: Option<(SavedPc, u64, i32)>,
 }
 
@@ -119,8 +120,7 @@ impl Vm {
         if !rests {
             return None;
         }
-        let Exchange { values, raised: _, requested_call: _, last_lookup, charges: _, collected_at } =
-            exchange;
+        let Exchange { values, raised: _, requested_call: _, lookups, charges: _, collected_at } = exchange;
         let database = database.copy()?;
         let host = host.save_all()?;
         Some(Snapshot {
@@ -140,7 +140,7 @@ impl Vm {
             },
             exchange: SavedExchange {
                 values: values.clone(),
-                last_lookup: *last_lookup,
+                lookups: lookups.saved(),
                 collected_at: *collected_at,
             },
             embedder: embedder.clone(),
@@ -180,7 +180,7 @@ impl Vm {
             values: exchange.values.clone(),
             raised: None,
             requested_call: Vec::new(),
-            last_lookup: exchange.last_lookup,
+            lookups: exchange.lookups.saved(),
             charges: Charges::default(),
             collected_at: exchange.collected_at,
         };

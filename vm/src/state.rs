@@ -231,7 +231,7 @@ list_state! { Exchange {
     values: Derived,
     raised: Derived,
     requested_call: Derived,
-    last_lookup: Derived,
+    lookups: Derived,
     charges: Derived,
     collected_at: Derived,
 } }

@@ -62,9 +62,43 @@ pub(crate) struct CompiledFunctions {
     /// The numbers that were given back.
     #[cfg(feature = "native")]
     pub(crate) free: Vec<u32>,
-    /// How often a code was found running, by its address.
+    /// How often codes were found running.
     #[cfg(feature = "native")]
-    pub(crate) heat: HashMap<u64, u32>,
+    pub(crate) heat: Heat,
+}
+
+/// How often codes were found running, by their addresses. A code that was not met for long may be forgotten
+/// for another one, so this takes little memory, and a count little time.
+#[cfg(feature = "native")]
+#[derive(Default)]
+pub(crate) struct Heat {
+    /// The address and the count of a code, at the place that the address gives.
+    places: Vec<(u64, u32)>,
+}
+
+#[cfg(feature = "native")]
+impl Heat {
+    /// Number of places: a power of two.
+    const PLACES: usize = 1024;
+
+    /// Counts a code, and returns its count.
+    pub(crate) fn count(&mut self, code: u64) -> u32 {
+        if self.places.is_empty() {
+            self.places.resize(Heat::PLACES, (0, 0));
+        }
+        let hash = code.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (u64::BITS - Heat::PLACES.ilog2());
+        let place = &mut self.places[hash as usize];
+        if place.0 != code {
+            *place = (code, 0);
+        }
+        place.1 = place.1.saturating_add(1);
+        place.1
+    }
+
+    /// Forgets all counts.
+    pub(crate) fn clear(&mut self) {
+        self.places.clear();
+    }
 }
 
 /// Machine code that calls may enter.
@@ -80,11 +114,18 @@ pub(crate) struct InstalledCode {
     pub(crate) has_guesses: bool,
     /// How often they were wrong.
     pub(crate) wrong: u32,
-    /// How often it was entered at a loop instruction, and the ticks that it has taken then, since both were
-    /// looked at.
-    pub(crate) loop_entries: u32,
-    /// See `loop_entries`.
-    pub(crate) loop_ticks: u32,
-    /// Whether its loop instructions do not lead to it for now.
+    /// How its loop instructions are used, in the order of [`MachineCode::loops`].
+    pub(crate) loops: Box<[LoopUse]>,
+}
+
+/// How often machine code is entered at a loop instruction, and whether that is worth it.
+#[cfg(feature = "native")]
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LoopUse {
+    /// Entries since their use was looked at.
+    pub(crate) entries: u32,
+    /// Ticks taken in these.
+    pub(crate) ticks: u32,
+    /// Whether the instruction does not lead to machine code for now.
     pub(crate) is_calm: bool,
 }

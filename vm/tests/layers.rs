@@ -29,6 +29,7 @@ const LAYERS: &[&str] = &[
     "task",
     "wait",
     "outside",
+    "lookup",
     "exchange",
     "schedule",
     "observe",

@@ -116,6 +116,12 @@ impl Table {
         if heap.is(v, Kind::HashTable) { Some(Table(v)) } else { None }
     }
 
+    /// Returns the value that the table is.
+    #[inline(always)]
+    pub fn value(self) -> Value {
+        self.0
+    }
+
     /// Creates a table with room for about `size` entries. `functions` are the program's functions for test
     /// and hash, or `NIL`.
     ///
@@ -157,6 +163,7 @@ impl Table {
         }
     }
 
+    #[inline]
     fn counter(self, heap: &Heap, counter: Counter) -> usize {
         heap.table_counter(self.0, counter).unwrap_or(0)
     }
@@ -182,6 +189,7 @@ impl Table {
     }
 
     /// Returns a number that changes whenever a key comes or goes.
+    #[inline]
     pub fn serial(self, heap: &Heap) -> usize {
         self.counter(heap, Counter::Serial)
     }

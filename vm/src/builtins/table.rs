@@ -6,6 +6,7 @@
 //! key, a table the same keys.
 
 use crate::equality::{self, KeyTest};
+use crate::lookup::KeyPlace;
 use crate::number;
 use crate::raise::{Exit, Outcome};
 use crate::table::{KeyComparison, Table, Trouble};
@@ -32,51 +33,12 @@ fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
     }
 }
 
-/// Returns the entry of a key, if it has one; and its hash, if that was needed to know.
+/// Finds a key, and charges for that.
 #[inline(always)]
 fn find(vm: &mut Vm, table: Table, key: Value) -> Result<KeyPlace, Exit> {
-    let KeyComparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
-    if let Some(entry) = vm.exchange.last_lookup.guess(key)
-        && let Some(value) = table.value_of(&vm.heap, entry, key)
-    {
-        return Ok(KeyPlace::Entry(entry, value));
-    }
-    match key.as_fixnum() {
-        // A fixnum is the same as itself alone.
-        Some(n) if test != KeyTest::Equalp => search(vm, table, KeyTest::Eq, key, equality::fixnum_hash(n)),
-        _ => find_other(vm, table, test, key),
-    }
-}
-
-/// As [`find`], for keys of any kind.
-#[inline(never)]
-fn find_other(vm: &mut Vm, table: Table, test: KeyTest, key: Value) -> Result<KeyPlace, Exit> {
-    let hash = equality::hash(&vm.heap, test, key);
-    search(vm, table, test, key, hash)
-}
-
-#[inline(always)]
-fn search(vm: &mut Vm, table: Table, test: KeyTest, key: Value, hash: u32) -> Result<KeyPlace, Exit> {
-    let mut work = LIMIT;
-    let found = table.find(&vm.heap, test, key, hash, &mut work)?;
-    if work != LIMIT {
-        vm.exchange.charge_elements(LIMIT - work);
-    }
-    Ok(match found {
-        Some((entry, value)) => {
-            vm.exchange.last_lookup.note(key, entry);
-            KeyPlace::Entry(entry, value)
-        }
-        None => KeyPlace::None(hash),
-    })
-}
-
-/// Outcome of a search.
-enum KeyPlace {
-    /// The entry with the key, and its value.
-    Entry(usize, Value),
-    /// There is none; the hash of the key.
-    None(u32),
+    let found = vm.exchange.lookups.locate(&vm.heap, table, key)?;
+    vm.exchange.note_lookup(&vm.heap, table, key, &found);
+    Ok(found.place)
 }
 
 pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -8,7 +8,7 @@ use super::super::{code_of, constants_of, first_instruction, stubs};
 use super::rouse_loops;
 use crate::fused::{quicken_loop, unfused};
 use crate::heap::layout::CodeObject;
-use crate::tier::{CompiledFunctions, InstalledCode, Tier};
+use crate::tier::{CompiledFunctions, InstalledCode, LoopUse, Tier};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -156,13 +156,12 @@ pub(super) unsafe fn install(
                 for &at in made.loops() {
                     quicken_loop(words, at);
                 }
-                (old.loop_entries, old.loop_ticks) = (0, 0);
+                old.loops = unused(&made);
                 old.stub.address = made.entry() as usize as u64;
                 compiled.report.bytes += made.bytes().next_multiple_of(4096);
                 compiled.report.bytes -= old.made.bytes().next_multiple_of(4096);
                 old.made = made;
                 old.has_guesses = false;
-                old.is_calm = false;
             }
             return;
         }
@@ -180,16 +179,13 @@ pub(super) unsafe fn install(
         }
         (*code).entry = (&raw const *stub).cast();
         let code = Value::from_object(code.cast()).bits();
-        compiled.installed[number as usize] = Some(InstalledCode {
-            stub,
-            made,
-            code,
-            has_guesses,
-            wrong: 0,
-            loop_entries: 0,
-            loop_ticks: 0,
-            is_calm: false,
-        });
+        compiled.installed[number as usize] =
+            Some(InstalledCode { stub, loops: unused(&made), made, code, has_guesses, wrong: 0 });
         rouse_loops(compiled);
     }
+}
+
+/// Returns the use of the loop instructions of machine code that was never entered at one.
+fn unused(made: &MachineCode) -> Box<[LoopUse]> {
+    vec![LoopUse::default(); made.loops().len()].into()
 }

@@ -10,6 +10,7 @@
 
 mod make;
 mod step;
+mod table;
 
 use std::ffi::c_void;
 use std::mem::MaybeUninit;
@@ -25,7 +26,7 @@ use crate::fused::quicken_loop;
 use crate::heap::layout::{CodeObject, Kind, SymbolObject};
 use crate::heap::{Heap, Phase};
 use crate::shape::Shape;
-use crate::tier::{CompiledFunctions, InstalledCode, Tier};
+use crate::tier::{CompiledFunctions, InstalledCode, LoopUse, Tier};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -122,51 +123,48 @@ pub(super) unsafe fn enter_at_loop(
         let entry = installed.made.entry();
         let leaving = run(vm, entry, place as u64 + 1, base, ticks);
         let is_auto = vm.compiled.tier == Tier::Auto;
-        let installed = vm.compiled.installed.get_mut(number)?.as_mut().filter(|_| is_auto);
-        if let Some(installed) = installed {
-            installed.loop_entries += 1;
+        let installed = vm.compiled.installed.get_mut(number).and_then(Option::as_mut);
+        let usage = installed.filter(|_| is_auto).and_then(|installed| installed.loops.get_mut(place));
+        if let Some(usage) = usage {
+            usage.entries += 1;
             let taken = ticks.saturating_sub(leaving.ticks).max(0) as u32;
-            installed.loop_ticks = installed.loop_ticks.saturating_add(taken);
-            if installed.loop_entries == ENTRIES {
-                if installed.loop_ticks < ENTRIES * LEAST_TICKS {
-                    installed.is_calm = true;
-                    calm_loops(code, installed.made.loops());
+            usage.ticks = usage.ticks.saturating_add(taken);
+            if usage.entries == ENTRIES {
+                let is_calm = usage.ticks < ENTRIES * LEAST_TICKS;
+                *usage = LoopUse { is_calm, ..LoopUse::default() };
+                if is_calm {
+                    calm_loop(pc);
                 }
-                (installed.loop_entries, installed.loop_ticks) = (0, 0);
             }
         }
         Some(leaving)
     }
 }
 
-/// Lets no loop instruction of a code lead to machine code any more.
+/// Lets a loop instruction lead to machine code no more.
 ///
 /// # Safety
-/// `code` points to a Code, and has loop instructions at these words.
+/// `pc` is at a loop instruction of a Code.
 #[cold]
-unsafe fn calm_loops(code: *mut CodeObject, loops: &[usize]) {
-    // SAFETY: by the contract these are words of the code, and nobody holds a reference to one.
-    unsafe {
-        let first = first_instruction(code).cast_mut();
-        for &at in loops {
-            *first.add(at) = word_at(first.add(at)).0;
-        }
-    }
+unsafe fn calm_loop(pc: *const u32) {
+    // SAFETY: by the contract this is a word of a code, and nobody holds a reference to it.
+    unsafe { *pc.cast_mut() = word_at(pc).0 };
 }
 
 /// Lets the loop instructions that lead no longer to machine code lead there again: what made it leave them
 /// at once may have been a call of what has machine code now.
 fn rouse_loops(compiled: &mut CompiledFunctions) {
-    for installed in compiled.installed.iter_mut().flatten().filter(|installed| installed.is_calm) {
-        installed.is_calm = false;
-        (installed.loop_entries, installed.loop_ticks) = (0, 0);
-        // SAFETY: the word was made of the address of a code, which is there: else this had been given back
-        // when all that is reached had been marked. Nobody holds a reference to its words.
-        unsafe {
-            let code = Value::from_bits(installed.code).object_ptr().cast::<CodeObject>();
-            let words = instructions(code).len();
-            let words = std::slice::from_raw_parts_mut(first_instruction(code).cast_mut(), words);
-            for &at in installed.made.loops() {
+    for installed in compiled.installed.iter_mut().flatten() {
+        for (usage, &at) in installed.loops.iter_mut().zip(installed.made.loops()) {
+            if !std::mem::take(&mut usage.is_calm) {
+                continue;
+            }
+            // SAFETY: the word was made of the address of a code, which is there: else this had been given
+            // back when all that is reached had been marked. Nobody holds a reference to its words.
+            unsafe {
+                let code = Value::from_bits(installed.code).object_ptr().cast::<CodeObject>();
+                let words = instructions(code).len();
+                let words = std::slice::from_raw_parts_mut(first_instruction(code).cast_mut(), words);
                 quicken_loop(words, at);
             }
         }
@@ -202,6 +200,9 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         bind: step::bind,
         unbind: step::unbind,
         cons: step::cons,
+        value_of_key: table::value_of_key,
+        set_value_of_key: table::set_value_of_key,
+        add_to_value_of_key: table::add_to_value_of_key,
     };
     // SAFETY: N2, N7: by the contract; the machine is borrowed for as long, and only helpers use it. A tail
     // call has made the frame of the function whose machine code the reply names.
@@ -324,9 +325,7 @@ unsafe fn note_call(vm: &mut Vm, pc: u64, base: u64) {
         if (*code).arity != word.b() as u32 || !Shape::is_bytecode((*code).spare[0]) {
             return;
         }
-        let heat = vm.compiled.heat.entry(code.addr() as u64).or_insert(0);
-        *heat += 1;
-        if *heat == HOT_CALLS {
+        if vm.compiled.heat.count(code.addr() as u64) == HOT_CALLS {
             let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), word.b());
             let mut guesses: Vec<_> = arguments.iter().map(|&value| Known::of(value)).collect();
             // Some, even if it is of nothing: doubles are told from other values.
@@ -390,9 +389,8 @@ impl Vm {
             unsafe {
                 let code = code_of(function);
                 let is_stub = (*code).nwords < 2;
-                let heat = self.compiled.heat.entry(code.addr() as u64).or_insert(0);
-                *heat += 1;
-                if (*heat == HOT || *heat == HOT_CALLS) && !is_stub {
+                let heat = self.compiled.heat.count(code.addr() as u64);
+                if matches!(heat, HOT | HOT_CALLS) && !is_stub {
                     make(self, code, registers.into_iter().map(Known::of).collect());
                 }
             }

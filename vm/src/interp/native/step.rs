@@ -40,7 +40,7 @@ impl From<Signal> for Done {
 ///
 /// # Safety
 /// Machine code has called the helper: the context is that of [`run`].
-unsafe fn parts<'a>(context: *mut NativeContext) -> (&'a mut Vm, *mut Caller) {
+pub(super) unsafe fn parts<'a>(context: *mut NativeContext) -> (&'a mut Vm, *mut Caller) {
     // SAFETY: by the contract; machine code does not use the machine while a helper does.
     unsafe {
         let caller = (*context).machine.cast::<Caller>();
