@@ -173,7 +173,8 @@ fn a_client_says_what_its_options_say() {
                 // The first subscription is refused, the others granted.
                 (0x82, 1) => [&b"\x90\x03"[..], &number(0), b"\x80"].concat(),
                 (0x82, _) => [&b"\x90\x03"[..], &number(0), b"\x01"].concat(),
-                // Before the acknowledgement come four messages of which two have room, and one of another topic.
+                // Before the acknowledgement come four messages of which two have room, and one of another
+                // topic.
                 (0x33, _) => {
                     let texts = ["1", "2", "3", "4"]
                         .map(|text| [&b"\x30\x04\x00\x01a"[..], text.as_bytes()].concat());

@@ -5,7 +5,7 @@
 //! behind an [`Exit::Call`], and what its work has cost) waits here until the interpreter takes it.
 
 use crate::heap::Heap;
-use crate::lookup::{Found, Lookups, STEPS_FOR_NOTHING};
+use crate::lookup::{Lookup, Lookups, STEPS_FOR_NOTHING};
 use crate::raise::{Arguments, Exit, Expected, Raised};
 use crate::saved_pc::SavedPc;
 use crate::table::Table;
@@ -221,7 +221,7 @@ impl Exchange {
 
     /// Notes a search in a hash table, and charges for it.
     #[inline(always)]
-    pub(crate) fn note_lookup(&mut self, heap: &Heap, table: Table, key: Value, found: &Found) {
+    pub(crate) fn note_lookup(&mut self, heap: &Heap, table: Table, key: Value, found: &Lookup) {
         if found.steps != 0 {
             self.charge_elements(found.steps);
         }

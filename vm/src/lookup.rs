@@ -14,7 +14,7 @@ const MOST_STEPS: usize = 4096;
 pub(crate) const STEPS_FOR_NOTHING: usize = 16;
 
 /// A search that has come to its end.
-pub(crate) struct Found {
+pub(crate) struct Lookup {
     pub(crate) place: KeyPlace,
     /// Steps that it has taken.
     pub(crate) steps: usize,
@@ -60,36 +60,51 @@ impl Lookups {
     /// # Errors
     /// [`Trouble::Slowly`] if that takes too much, or only ESL can tell.
     #[inline(always)]
-    pub(crate) fn locate(&self, heap: &Heap, table: Table, key: Value) -> Result<Found, Trouble> {
-        let KeyComparison::Native(test) = table.comparison(heap) else { return Err(Trouble::Slowly) };
-        if let Some(entry) = self.last.guess(key)
-            && let Some(value) = table.value_of(heap, entry, key)
-        {
-            return Ok(Found { place: KeyPlace::Entry(entry, value), steps: 0, way: Way::Last });
-        }
+    pub(crate) fn locate(&self, heap: &Heap, table: Table, key: Value) -> Result<Lookup, Trouble> {
         match key.as_fixnum() {
-            // A fixnum is the same as itself alone, and needs no better guess than its hash.
-            Some(n) if test != KeyTest::Equalp => {
-                search(heap, table, KeyTest::Eq, key, equality::fixnum_hash(n), Way::Guess)
-            }
-            _ => self.locate_other(heap, table, test, key),
+            Some(n) => self.locate_fixnum(heap, table, key, n),
+            None => self.locate_other(heap, table, key),
+        }
+    }
+
+    /// As [`Lookups::locate`], for the key that is the fixnum `n`.
+    #[inline(always)]
+    pub(crate) fn locate_fixnum(
+        &self,
+        heap: &Heap,
+        table: Table,
+        key: Value,
+        n: i64,
+    ) -> Result<Lookup, Trouble> {
+        match table.comparison(heap) {
+            KeyComparison::Program => Err(Trouble::Slowly),
+            KeyComparison::Native(KeyTest::Equalp) => self.locate_other(heap, table, key),
+            KeyComparison::Native(_) => match self.last.place(heap, table, key) {
+                Some(place) => Ok(Lookup { place, steps: 0, way: Way::Last }),
+                // A fixnum is the same as itself alone, and needs no better guess than its hash.
+                None => search(heap, table, KeyTest::Eq, key, equality::fixnum_hash(n), Way::Guess),
+            },
         }
     }
 
     /// As [`Lookups::locate`], for keys of any kind.
     #[inline(never)]
-    fn locate_other(&self, heap: &Heap, table: Table, test: KeyTest, key: Value) -> Result<Found, Trouble> {
+    pub(crate) fn locate_other(&self, heap: &Heap, table: Table, key: Value) -> Result<Lookup, Trouble> {
+        let KeyComparison::Native(test) = table.comparison(heap) else { return Err(Trouble::Slowly) };
+        if let Some(place) = self.last.place(heap, table, key) {
+            return Ok(Lookup { place, steps: 0, way: Way::Last });
+        }
         if let Some(entry) = self.entries.guess(key, table.value(), table.serial(heap))
             && let Some(value) = table.value_of(heap, entry, key)
         {
-            return Ok(Found { place: KeyPlace::Entry(entry, value), steps: 0, way: Way::Guess });
+            return Ok(Lookup { place: KeyPlace::Entry(entry, value), steps: 0, way: Way::Guess });
         }
         search(heap, table, test, key, equality::hash(heap, test, key), Way::Search)
     }
 
     /// Notes what a search has found.
     #[inline(always)]
-    pub(crate) fn note(&mut self, heap: &Heap, table: Table, key: Value, found: &Found) {
+    pub(crate) fn note(&mut self, heap: &Heap, table: Table, key: Value, found: &Lookup) {
         if found.way == Way::Last {
             return;
         }
@@ -114,13 +129,13 @@ fn search(
     key: Value,
     hash: u32,
     way: Way,
-) -> Result<Found, Trouble> {
+) -> Result<Lookup, Trouble> {
     let mut left = MOST_STEPS;
     let place = match table.find(heap, test, key, hash, &mut left)? {
         Some((entry, value)) => KeyPlace::Entry(entry, value),
         None => KeyPlace::None(hash),
     };
-    Ok(Found { place, steps: MOST_STEPS - left, way })
+    Ok(Lookup { place, steps: MOST_STEPS - left, way })
 }
 
 /// The entry that was found last in a hash table, by which the next one is guessed.
@@ -144,6 +159,14 @@ impl Default for LastLookup {
 }
 
 impl LastLookup {
+    /// Returns the place of a key, if the guess is right.
+    #[inline(always)]
+    fn place(&self, heap: &Heap, table: Table, key: Value) -> Option<KeyPlace> {
+        let entry = self.guess(key)?;
+        let value = table.value_of(heap, entry, key)?;
+        Some(KeyPlace::Entry(entry, value))
+    }
+
     /// Returns the number of the entry that probably has `key`.
     #[inline(always)]
     fn guess(&self, key: Value) -> Option<usize> {
@@ -163,8 +186,8 @@ impl LastLookup {
     }
 }
 
-/// The entries that searches for keys other than integers have lately led to, by which later ones for the very
-/// same keys are guessed: a text is not read then, nor its hash computed.
+/// The entries that searches for keys other than integers have lately led to, by which later ones for the
+/// very same keys are guessed: a text is not read then, nor its hash computed.
 ///
 /// A guess holds if the entry has that very key, and the table has got and lost none since, so that a search
 /// would take what it has taken then: less than what is charged for. So ticks do not depend on guesses.

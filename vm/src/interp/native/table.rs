@@ -3,7 +3,7 @@
 use esl_native::NativeContext;
 
 use super::step::parts;
-use crate::lookup::KeyPlace;
+use crate::lookup::{KeyPlace, Lookup};
 use crate::table::Table;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -20,7 +20,7 @@ pub(super) unsafe extern "C" fn value_of_key(
     unsafe {
         let (vm, _) = parts(context);
         let (key, table) = (Value::from_bits(key), Value::from_bits(table));
-        end_lookup(context, value_of_key_at_once(vm, key, table, Value::from_bits(default)))
+        end_lookup(context, at_once(vm, LookupDeed::Get, key, table, Value::from_bits(default)))
     }
 }
 
@@ -36,7 +36,7 @@ pub(super) unsafe extern "C" fn set_value_of_key(
     unsafe {
         let (vm, _) = parts(context);
         let (key, table) = (Value::from_bits(key), Value::from_bits(table));
-        end_lookup(context, set_value_of_key_at_once(vm, key, table, Value::from_bits(value)))
+        end_lookup(context, at_once(vm, LookupDeed::Set, key, table, Value::from_bits(value)))
     }
 }
 
@@ -52,7 +52,7 @@ pub(super) unsafe extern "C" fn add_to_value_of_key(
     unsafe {
         let (vm, _) = parts(context);
         let (key, table) = (Value::from_bits(key), Value::from_bits(table));
-        end_lookup(context, add_to_value_of_key_at_once(vm, key, table, Value::from_bits(delta)))
+        end_lookup(context, at_once(vm, LookupDeed::Add, key, table, Value::from_bits(delta)))
     }
 }
 
@@ -73,39 +73,60 @@ unsafe fn end_lookup(context: *mut NativeContext, found: Option<Value>) -> u64 {
     value.bits()
 }
 
-/// Does a `gethash` that wants one value; `None`, without effect, if that takes more than a search.
-#[inline(always)]
-fn value_of_key_at_once(vm: &mut Vm, key: Value, table: Value, default: Value) -> Option<Value> {
-    let table = Table::of(&vm.heap, table)?;
-    let found = vm.exchange.lookups.locate(&vm.heap, table, key).ok()?;
-    vm.exchange.note_lookup(&vm.heap, table, key, &found);
-    Some(match found.place {
-        KeyPlace::Entry(_, value) => value,
-        KeyPlace::None(_) => default,
-    })
+/// What is done with a key.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum LookupDeed {
+    /// A `gethash` that wants one value, given the default.
+    Get,
+    /// A `%puthash` of a key that is there, given the value.
+    Set,
+    /// An `%add-to-value` of a fixnum that is there, given another one, if the sum is one too.
+    Add,
 }
 
-/// Does a `puthash` of a key that the table has; `None`, without effect, if it has none, or that takes more
-/// than a search.
+/// Does something with a key; `None`, without effect, if that takes more than a search.
 #[inline(always)]
-fn set_value_of_key_at_once(vm: &mut Vm, key: Value, table: Value, value: Value) -> Option<Value> {
+fn at_once(vm: &mut Vm, deed: LookupDeed, key: Value, table: Value, given: Value) -> Option<Value> {
     let table = Table::of(&vm.heap, table)?;
-    let found = vm.exchange.lookups.locate(&vm.heap, table, key).ok()?;
-    let KeyPlace::Entry(entry, _) = found.place else { return None };
-    vm.exchange.note_lookup(&vm.heap, table, key, &found);
-    table.set_value(&mut vm.heap, entry, value);
+    match key.as_fixnum() {
+        Some(n) => {
+            let found = vm.exchange.lookups.locate_fixnum(&vm.heap, table, key, n).ok()?;
+            act(vm, deed, key, table, &found, given)
+        }
+        None => with_other_key(vm, deed, key, table, given),
+    }
+}
+
+/// As [`at_once`], for keys of any kind: so the way of fixnums needs no memory.
+#[inline(never)]
+fn with_other_key(vm: &mut Vm, deed: LookupDeed, key: Value, table: Table, given: Value) -> Option<Value> {
+    let found = vm.exchange.lookups.locate_other(&vm.heap, table, key).ok()?;
+    act(vm, deed, key, table, &found, given)
+}
+
+/// Does something with a key that was searched.
+#[inline(always)]
+fn act(
+    vm: &mut Vm,
+    deed: LookupDeed,
+    key: Value,
+    table: Table,
+    found: &Lookup,
+    given: Value,
+) -> Option<Value> {
+    let value = match (deed, &found.place) {
+        (LookupDeed::Get, &KeyPlace::Entry(_, value)) => value,
+        (LookupDeed::Get, KeyPlace::None(_)) | (LookupDeed::Set, KeyPlace::Entry(..)) => given,
+        (LookupDeed::Add, KeyPlace::Entry(_, value)) => {
+            Value::fixnum(value.as_fixnum()?.checked_add(given.as_fixnum()?)?)?
+        }
+        (LookupDeed::Set | LookupDeed::Add, KeyPlace::None(_)) => return None,
+    };
+    vm.exchange.note_lookup(&vm.heap, table, key, found);
+    if let KeyPlace::Entry(entry, _) = found.place
+        && deed != LookupDeed::Get
+    {
+        table.set_value(&mut vm.heap, entry, value);
+    }
     Some(value)
-}
-
-/// Does an `add_to_value` of a key that the table has, whose value is a fixnum, as are `delta` and the sum;
-/// `None`, without effect, for all others, or if that takes more than a search.
-#[inline(always)]
-fn add_to_value_of_key_at_once(vm: &mut Vm, key: Value, table: Value, delta: Value) -> Option<Value> {
-    let table = Table::of(&vm.heap, table)?;
-    let found = vm.exchange.lookups.locate(&vm.heap, table, key).ok()?;
-    let KeyPlace::Entry(entry, value) = found.place else { return None };
-    let sum = Value::fixnum(value.as_fixnum()?.checked_add(delta.as_fixnum()?)?)?;
-    vm.exchange.note_lookup(&vm.heap, table, key, &found);
-    table.set_value(&mut vm.heap, entry, sum);
-    Some(sum)
 }
