@@ -1,6 +1,8 @@
 //! Searches in hash tables, and the guesses that shorten them.
 //!
-//! Guesses change nothing that a program can tell: neither what is found, nor the ticks that it takes.
+//! Guesses change nothing that a program can tell: neither what is found, nor the ticks that it takes. But a
+//! program that changes a key while a table has it, which the standard leaves undefined, may find the key by
+//! a guess where a search would miss it.
 
 use crate::equality::{self, KeyTest};
 use crate::heap::Heap;
