@@ -735,6 +735,14 @@ macro_rules! define_opcodes {
                 }
             }
 
+            /// Adds `by` to the number of each register that operands name, and of each window.
+            #[allow(unused_variables, reason = "some instructions have no operands")]
+            pub fn move_registers(&mut self, by: u8) {
+                match self {
+                    $( Instr::$name { $( $field ),* } => { $( $field.move_register(by); )* } )*
+                }
+            }
+
             /// Calls `visit` with each operand's type, as its operand newtype is called, its text and its
             /// role.
             pub fn visit_texts(&self, mut visit: impl FnMut(&'static str, &dyn fmt::Display, Role)) {

@@ -18,6 +18,8 @@ pub trait Operand: Copy + fmt::Display {
     /// Makes a jump or a landing lead this many words from the next instruction on. Leaves other operands as
     /// they are.
     fn retarget(&mut self, distance: i32);
+    /// Adds `by` to the number of a register. Leaves other operands as they are.
+    fn move_register(&mut self, by: u8);
 }
 
 /// Meaning of an operand that is independent of its opcode.
@@ -92,6 +94,16 @@ macro_rules! operands {
             fn retarget(&mut self, distance: i32) {
                 if let Role::Forward(_) | Role::Backward(_) | Role::Landing(_) = self.role() {
                     self.0 = distance as $repr;
+                }
+            }
+            fn move_register(&mut self, by: u8) {
+                if let Role::Read(register)
+                | Role::Write(register)
+                | Role::ReadRange(register)
+                | Role::WriteRange(register)
+                | Role::Window(register) = self.role()
+                {
+                    self.0 = register.wrapping_add(by) as $repr;
                 }
             }
         }
@@ -210,6 +222,7 @@ impl Operand for Want {
         Role::Want(self)
     }
     fn retarget(&mut self, _distance: i32) {}
+    fn move_register(&mut self, _by: u8) {}
 }
 
 impl fmt::Display for Want {

@@ -18,6 +18,8 @@ pub const RETURN_VALUES: u64 = 4;
 
 /// As [`AGAIN`], since a register does not hold what was guessed when the machine code was made.
 pub const GUESSED_WRONG: u64 = 5;
+/// As [`AGAIN`], at a call of a function that was inlined, and is no longer the one that is called.
+pub const REDEFINED: u64 = 6;
 
 /// What a helper says of an instruction: go on with the next one.
 pub const STEP_NEXT: u64 = 0;
@@ -72,9 +74,12 @@ pub struct NativeContext {
     pub pc: u64,
     /// Where it was left: base of the frame.
     pub base: u64,
+    /// Where it was left: base of the frame of the function whose machine code it is, which is another one if
+    /// it was left in an inlined function.
+    pub outer: u64,
     /// Value that a builtin called in place of the function has returned.
     pub value: u64,
-    /// Registers of the frame whose doubles are put aside: see N3. None while machine code runs.
+    /// Registers, from `outer` on, whose doubles are put aside: see N3. None while machine code runs.
     pub put_aside: [u64; 4],
     /// The bits of each of them, or [`IN_PLACE`].
     pub doubles: [MaybeUninit<u64>; 256],

@@ -51,15 +51,20 @@ impl Translator<'_, '_> {
     }
 
     /// Returns the function of the symbol that is a constant.
-    fn global(&mut self, symbol: u32) -> Ssa {
+    pub(crate) fn global(&mut self, symbol: u32) -> Ssa {
         let symbol = self.constant(symbol as usize);
         self.load(symbol, in_object(offset_of!(SymbolObject, function)))
     }
 
     /// Returns the running function.
-    fn running(&mut self) -> Ssa {
-        let base = self.base;
-        self.load(base, FUNCTION)
+    pub(crate) fn running(&mut self) -> Ssa {
+        let (base, place) = (self.base, self.place(0) + FUNCTION);
+        self.load(base, place)
+    }
+
+    /// Returns where a register of the running frame is, from the base of the frame of the function itself on.
+    fn place(&self, register: u8) -> i32 {
+        (i32::from(self.frame.base) + i32::from(register)) * WORD
     }
 
     /// Leaves at this instruction unless `function`, a Function, has machine code and takes `count`
@@ -81,9 +86,14 @@ impl Translator<'_, '_> {
 
     /// Leaves at this instruction unless there is room for so many registers from `base` on.
     fn require_room(&mut self, base: Ssa, registers: Ssa) {
-        let exit = self.exit();
         let bytes = self.b.ins().ishl_imm_s(registers, 3);
         let top = self.b.ins().iadd(base, bytes);
+        self.require_room_below(top);
+    }
+
+    /// Leaves at this instruction unless there is room below `top`.
+    pub(crate) fn require_room_below(&mut self, top: Ssa) {
+        let exit = self.exit();
         let limit = self.load_context(offset_of!(NativeContext, limit));
         let fits = self.b.ins().icmp(IntCC::UnsignedLessThanOrEqual, top, limit);
         self.require(fits, exit);
@@ -118,14 +128,13 @@ impl Translator<'_, '_> {
         let function = self.running();
         let (itself, pointer) = (self.itself, self.pointer);
         let address = self.b.ins().func_addr(pointer, itself);
-        let registers = self.word(self.source.registers as u64);
+        let registers = self.word(self.source.function.registers as u64);
         self.call(window, NativeCallee { function, address, registers }, Some(()), next);
     }
 
     /// Makes the frame of a callee in the window, and calls it.
     fn call(&mut self, window: u8, callee: NativeCallee, itself: Option<()>, next: usize) {
-        let (context, base) = (self.context, self.base);
-        let place = i32::from(window) * WORD;
+        let (base, place) = (self.base, i32::from(window) * WORD);
         let frame = self.b.ins().iadd_imm_s(base, i64::from(place + 2 * WORD));
         self.require_room(frame, callee.registers);
         self.tick();
@@ -133,7 +142,14 @@ impl Translator<'_, '_> {
         let return_to = self.pc(next);
         self.store(return_to, base, place + WORD);
         self.kept_back = RegisterBits::NONE;
-        let first = self.word(0);
+        let value = self.invoke(window, frame, callee.address, itself);
+        self.set(window, value, Known::Nothing);
+    }
+
+    /// Calls machine code in a frame that has been made, and returns its value. What else it may say than
+    /// that it has returned is dealt with; more values than one are delivered to the window.
+    pub(crate) fn invoke(&mut self, window: u8, frame: Ssa, given: Ssa, itself: Option<()>) -> Ssa {
+        let (context, base, first) = (self.context, self.base, self.word(0));
         let (again, address) = self.block_with_value();
         let (done, value) = self.block_with_value();
         let other = self.cold_block();
@@ -149,7 +165,7 @@ impl Translator<'_, '_> {
             results(self, call);
             self.b.set_cold_block(again);
         } else {
-            self.jump_with(again, callee.address);
+            self.jump_with(again, given);
         }
         self.b.switch_to_block(again);
         let call = self.b.ins().call_indirect(self.entry_signature, address, &[context, frame, first]);
@@ -166,38 +182,41 @@ impl Translator<'_, '_> {
         self.b.ins().return_(&[status_of_other, value_of_other]);
         self.go_to(values);
         self.call_helper(offset_of!(NativeContext, first_value));
-        let first = self.load(base, place);
+        let first = self.load(base, i32::from(window) * WORD);
         self.jump_with(done, first);
         self.go_to(done);
-        self.set(window, value, Known::Nothing);
+        value
     }
 
     pub(crate) fn tail_call_global(&mut self, window: u8, count: u8, symbol: u32) {
         self.put_back();
         let function = self.global(symbol);
-        self.tail_call(window, count, function);
+        let address = self.replace_frame(window, count, function);
+        self.reply_with(TAIL, address);
+        self.ended();
     }
 
     pub(crate) fn tail_call_given(&mut self, window: u8, count: u8) {
         self.put_back();
         let (function, exit) = (self.get(window), self.exit());
         self.require_kind(function, Kind::Function, exit);
-        self.tail_call(window, count, function);
+        let address = self.replace_frame(window, count, function);
+        self.reply_with(TAIL, address);
+        self.ended();
     }
 
-    /// Puts the frame of a callee in place of this one, and leaves the call to the caller.
-    fn tail_call(&mut self, window: u8, count: u8, function: Ssa) {
-        let base = self.base;
+    /// Puts the frame of a callee in place of the running one, and returns the address of its machine code.
+    pub(crate) fn replace_frame(&mut self, window: u8, count: u8, function: Ssa) -> Ssa {
+        let (outer, base) = (self.base, self.base_at(self.at));
         let callee = self.callee(function, count);
         self.require_room(base, callee.registers);
         self.tick();
         let arguments: Vec<Ssa> = (0..count).map(|i| self.get(window + 2 + i)).collect();
         for (i, argument) in arguments.into_iter().enumerate() {
-            self.store(argument, base, i as i32 * WORD);
+            self.store(argument, outer, self.place(i as u8));
         }
-        self.store(function, base, FUNCTION);
-        self.reply_with(TAIL, callee.address);
-        self.ended();
+        self.store(function, outer, self.place(0) + FUNCTION);
+        callee.address
     }
 
     /// The square root of a double.
@@ -251,6 +270,16 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn tail_call_builtin(&mut self) {
+        let more = self.builtin_in_place();
+        let value = self.load_context(offset_of!(NativeContext, value));
+        self.reply_with(RETURNED, value);
+        self.go_to(more);
+        self.return_values();
+    }
+
+    /// Calls a builtin in place of the running function, and goes on with its value in the context. Returns
+    /// the block in which it has left others in the value list.
+    pub(crate) fn builtin_in_place(&mut self) -> Block {
         self.put_back();
         self.tick();
         let outcome = self.call_helper(offset_of!(NativeContext, tail_builtin));
@@ -259,16 +288,13 @@ impl Translator<'_, '_> {
         self.refuse(is_signal, signal);
         self.branch(outcome, more, one);
         self.go_to(one);
-        let value = self.load_context(offset_of!(NativeContext, value));
-        self.reply_with(RETURNED, value);
-        self.go_to(more);
-        self.return_values();
+        more
     }
 
     pub(crate) fn return_value(&mut self, register: u8) {
         self.make_word(usize::from(register));
         let value = self.get(register);
-        self.clear_places();
+        self.clear_places(RegisterBits::all_from(0));
         self.reply_with(RETURNED, value);
         self.ended();
     }

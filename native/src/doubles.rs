@@ -372,6 +372,10 @@ impl Translator<'_, '_> {
 
     /// Tells the machine what has been put aside.
     fn name_put_aside(&mut self, kept_back: RegisterBits) {
+        if kept_back != RegisterBits::NONE {
+            let outer = self.base;
+            self.store_context(outer, offset_of!(NativeContext, outer));
+        }
         for (index, word) in kept_back.words().into_iter().enumerate().filter(|&(_, word)| word != 0) {
             let word = self.word(word);
             self.store_context(word, offset_of!(NativeContext, put_aside) + index * size_of::<u64>());
@@ -421,14 +425,16 @@ impl Translator<'_, '_> {
         self.kept_back = kept_back.without(self.kept_back);
     }
 
-    /// Writes words that hold no address where doubles are kept back that nobody will read.
-    pub(crate) fn clear_places(&mut self) {
+    /// Writes words that hold no address where doubles are kept back that nobody will read, in some of the
+    /// registers.
+    pub(crate) fn clear_places(&mut self, registers: RegisterBits) {
         let (doubles, spent) = self.kept_back();
         let (zero, base) = (self.constant_value(Value::small(0)), self.base);
-        for register in doubles.iter() {
+        for register in doubles.within(registers).iter() {
             self.store(zero, base, register as i32 * WORD);
         }
-        self.write_all_spent(spent);
+        self.write_all_spent(spent.within(registers));
+        self.kept_back = self.kept_back.without(registers);
     }
 
     // Ways from one instruction to another.

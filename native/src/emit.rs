@@ -74,7 +74,7 @@ impl Translator<'_, '_> {
 
     /// Returns constant `index` of the function, as it is when the machine code runs.
     pub(crate) fn constant(&mut self, index: usize) -> Ssa {
-        let address = self.word(self.source.constants_at + (index * WORD as usize) as u64);
+        let address = self.word(self.frame.source.constants_at + (index * WORD as usize) as u64);
         self.load(address, 0)
     }
 
@@ -349,7 +349,17 @@ impl Translator<'_, '_> {
 
     /// Returns the address of a word of the bytecode.
     pub(crate) fn pc(&mut self, at: usize) -> Ssa {
-        self.word(self.source.words_at + 4 * at as u64)
+        let frame = &self.flow.frames[self.flow.frame_at(at)];
+        self.word(frame.source.words_at + 4 * (at - frame.first) as u64)
+    }
+
+    /// Returns the base of the frame in which a word of the bytecode runs.
+    pub(crate) fn base_at(&mut self, at: usize) -> Ssa {
+        let (base, registers) = (self.base, self.flow.frames[self.flow.frame_at(at)].base);
+        if registers == 0 {
+            return base;
+        }
+        self.b.ins().iadd_imm_s(base, i64::from(registers) * i64::from(WORD))
     }
 
     /// Has a function of the machine do the instruction, and returns what it says.
@@ -358,7 +368,7 @@ impl Translator<'_, '_> {
     pub(crate) fn call_helper(&mut self, helper: usize) -> Ssa {
         debug_assert!(self.batch.is_none(), "{}", self.at);
         self.put_all_aside(self.kept_back);
-        let (context, base, pc) = (self.context, self.base, self.pc(self.at));
+        let (context, base, pc) = (self.context, self.base_at(self.at), self.pc(self.at));
         let helper = self.load_context(helper);
         let call = self.b.ins().call_indirect(self.helper_signature, helper, &[context, pc, base]);
         self.b.inst_results(call)[0]
@@ -473,9 +483,10 @@ impl Translator<'_, '_> {
 
     /// Leaves at the instruction at a word.
     pub(crate) fn leave_at(&mut self, at: usize, status: u64) {
-        let (pc, base) = (self.pc(at), self.base);
+        let (pc, base, outer) = (self.pc(at), self.base_at(at), self.base);
         self.store_context(pc, offset_of!(NativeContext, pc));
         self.store_context(base, offset_of!(NativeContext, base));
+        self.store_context(outer, offset_of!(NativeContext, outer));
         self.reply(status);
     }
 

@@ -1,62 +1,218 @@
 //! The blocks of a function's bytecode: which instructions machine code can reach, and where jumps lead.
+//!
+//! The instructions of functions that are inlined stand behind those of the function itself, once for each
+//! call. All have their places in one numbering of words, and their registers in one numbering of registers:
+//! that of the frame of the function itself, which the frames above it continue.
 
-use esl_bytecode::opcode::Instr;
-use esl_bytecode::operand::Role;
+use esl_bytecode::opcode::{Instr, Opcode};
+use esl_bytecode::operand::{Role, Want};
+
+use crate::maker::{FunctionSource, InlinedSource, NativeSource};
+
+/// Most words of a function that is inlined.
+pub const MAX_INLINED: usize = 48;
+
+/// Most words of all that are inlined in one function.
+const MAX_INLINED_IN_ALL: usize = 600;
+
+/// Most calls of inlined functions within each other.
+const MAX_DEPTH: usize = 3;
+
+/// Most registers: an operand names one of so many.
+const MAX_REGISTERS: usize = 256;
+
+/// Returns whether a function of these instructions is so small and so simple that its calls may be replaced
+/// by its instructions.
+pub fn may_be_inlined(words: &[u32]) -> bool {
+    if words.len() > MAX_INLINED {
+        return false;
+    }
+    let mut at = 0;
+    while at < words.len() {
+        let Some(instr) = Instr::decode(words, at) else { return false };
+        let opcode = instr.opcode();
+        let is_simple = !opcode.is_loop()
+            && !matches!(opcode, Opcode::CallSelf | Opcode::Apply | Opcode::TailApply | Opcode::Throw);
+        if !is_simple {
+            return false;
+        }
+        at += opcode.words();
+    }
+    true
+}
+
+/// How an instruction leads from one frame to another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FrameChange {
+    /// It stays in its frame, or leaves the machine code.
+    None,
+    /// It is a call of an inlined function: with the window, and the number of arguments.
+    Enter { window: u8, count: u8 },
+    /// It returns from an inlined function: the value goes to this register.
+    Return { to: u8 },
+}
 
 /// An instruction that machine code can reach.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FlowStep {
-    /// The instruction.
+    /// The instruction, its registers numbered from the frame of the function itself on.
     pub(crate) instr: Instr,
     /// Where it jumps to, if it jumps.
     pub(crate) target: Option<usize>,
-    /// Word behind it.
+    /// Word behind it; behind the call, if it returns from an inlined function.
     pub(crate) next: usize,
+    /// Whether control may go on behind it.
+    pub(crate) falls_through: bool,
     /// Whether a jump leads to it.
     pub(crate) is_target: bool,
+    /// Number of its frame.
+    pub(crate) frame: usize,
+    /// How it leads to another frame.
+    pub(crate) change: FrameChange,
+}
+
+impl FlowStep {
+    /// Returns the words to which control goes from it.
+    pub(crate) fn ways(&self) -> impl Iterator<Item = usize> + use<> {
+        self.falls_through.then_some(self.next).into_iter().chain(self.target)
+    }
+}
+
+/// The instructions of the function itself, or those of one call of an inlined one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FlowFrame<'a> {
+    /// What is translated.
+    pub(crate) source: &'a FunctionSource,
+    /// The word that its first one is.
+    pub(crate) first: usize,
+    /// The register that its first one is.
+    pub(crate) base: u8,
+    /// The inlined function, unless it is the function itself.
+    pub(crate) inlined: Option<&'a InlinedSource>,
+    /// Where an inlined function returns to.
+    back: Option<Back>,
+}
+
+/// Where an inlined function returns to.
+#[derive(Clone, Copy, Debug)]
+struct Back {
+    /// Number of the caller's frame.
+    frame: usize,
+    /// The register that gets the value.
+    to: u8,
+    /// The word behind the call.
+    next: usize,
 }
 
 /// The flow of a function.
 #[derive(Debug)]
-pub(crate) struct NativeFlow {
+pub(crate) struct NativeFlow<'a> {
     /// The reachable instruction at each word.
     pub(crate) steps: Vec<Option<FlowStep>>,
     /// Words of the loop instructions, in their order: machine code may be entered there.
     pub(crate) loops: Vec<usize>,
+    /// The function itself, and the calls of inlined ones.
+    pub(crate) frames: Vec<FlowFrame<'a>>,
+    /// Number of registers of all frames.
+    pub(crate) registers: usize,
 }
 
-impl NativeFlow {
+impl<'a> NativeFlow<'a> {
     /// Follows the instructions of verified code; `None` for code that ends in the midst of one.
-    pub(crate) fn of(words: &[u32]) -> Option<NativeFlow> {
-        let loops = loop_words(words)?;
-        let mut steps: Vec<Option<FlowStep>> = vec![None; words.len()];
+    pub(crate) fn of(source: &'a NativeSource) -> Option<NativeFlow<'a>> {
+        let function = &source.function;
+        let loops = loop_words(&function.words)?;
         let mut open = vec![0];
         open.extend(&loops);
+        let mut flow = NativeFlow {
+            steps: vec![None; function.words.len()],
+            loops,
+            frames: vec![FlowFrame { source: function, first: 0, base: 0, inlined: None, back: None }],
+            registers: function.registers,
+        };
         let mut edges = Vec::new();
         while let Some(at) = open.pop() {
-            if steps.get(at)?.is_some() {
+            if flow.steps.get(at)?.is_some() {
                 continue;
             }
-            let instr = Instr::decode(words, at)?;
-            let next = at + instr.opcode().words();
-            let target = target_of(&instr, next);
-            steps[at] = Some(FlowStep { instr, target, next, is_target: false });
-            if let Some(target) = target {
-                open.push(target);
-                edges.push((target, true));
-            }
-            if instr.opcode().falls_through() {
-                open.push(next);
-                edges.push((next, false));
-            }
+            let step = flow.step(at, &source.inlined)?;
+            flow.steps[at] = Some(step);
+            open.extend(step.ways());
+            edges.extend(step.target.map(|to| (to, true)));
+            edges.extend(step.falls_through.then_some((step.next, false)));
         }
         edges.push((0, true));
-        edges.extend(loops.iter().map(|&at| (at, true)));
+        edges.extend(flow.loops.iter().map(|&at| (at, true)));
         for (to, is_jump) in edges {
-            let step = steps.get_mut(to)?.as_mut()?;
+            let step = flow.steps.get_mut(to)?.as_mut()?;
             step.is_target |= is_jump;
         }
-        Some(NativeFlow { steps, loops })
+        Some(flow)
+    }
+
+    /// Returns the number of the frame in which a word is.
+    pub(crate) fn frame_at(&self, at: usize) -> usize {
+        self.frames.partition_point(|frame| frame.first <= at) - 1
+    }
+
+    /// Decodes the instruction at a word; a call that is inlined gets a frame.
+    fn step(&mut self, at: usize, inlined: &'a [InlinedSource]) -> Option<FlowStep> {
+        let number = self.frame_at(at);
+        let frame = self.frames[number];
+        let mut instr = Instr::decode(&frame.source.words, at - frame.first)?;
+        let callee = self.callee(number, &instr, inlined);
+        instr.move_registers(frame.base);
+        let next = at + instr.opcode().words();
+        let mut step = FlowStep {
+            instr,
+            target: target_of(&instr, next),
+            next,
+            falls_through: instr.opcode().falls_through(),
+            is_target: false,
+            frame: number,
+            change: FrameChange::None,
+        };
+        if let (Some(callee), Instr::CallGlobal { window, count, .. }) = (callee, instr) {
+            let (first, base) = (self.steps.len(), window.0 + 2);
+            let back = Some(Back { frame: number, to: window.0, next });
+            let source = &callee.function;
+            self.frames.push(FlowFrame { source, first, base, inlined: Some(callee), back });
+            self.steps.resize(first + source.words.len(), None);
+            self.registers = self.registers.max(usize::from(base) + source.registers);
+            step.target = Some(first);
+            step.falls_through = false;
+            step.change = FrameChange::Enter { window: window.0, count: count.0 };
+        } else if let Some(back) = frame.back
+            && !step.falls_through
+            && step.target.is_none()
+        {
+            (step.next, step.target) = (back.next, Some(back.next));
+            step.change = FrameChange::Return { to: back.to };
+        }
+        Some(step)
+    }
+
+    /// Returns the function that an instruction of a frame calls, if it is inlined there.
+    fn callee(&self, frame: usize, instr: &Instr, inlined: &'a [InlinedSource]) -> Option<&'a InlinedSource> {
+        let Instr::CallGlobal { window, count, want: Want::ONE, symbol } = *instr else { return None };
+        let caller = &self.frames[frame];
+        let symbol = *caller.source.constants.get(symbol.0 as usize)?;
+        let callee = inlined.iter().find(|callee| callee.symbol == symbol && callee.arity == count.0)?;
+        let source = &callee.function;
+        let base = usize::from(caller.base) + usize::from(window.0) + 2;
+        let words = self.steps.len() - self.frames[0].source.words.len();
+        let (mut depth, mut around) = (1, Some(frame));
+        while let Some(frame) = around.map(|number| &self.frames[number]) {
+            if frame.source.words_at == source.words_at {
+                return None;
+            }
+            around = frame.back.map(|back| back.frame);
+            depth += usize::from(around.is_some());
+        }
+        let fits = depth <= MAX_DEPTH
+            && base + source.registers <= MAX_REGISTERS
+            && words + source.words.len() <= MAX_INLINED_IN_ALL;
+        fits.then_some(callee)
     }
 }
 

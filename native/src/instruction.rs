@@ -15,7 +15,7 @@ use crate::abi::NativeContext;
 use crate::arithmetic::{Arithmetic, NumberOrder};
 use crate::calls::lookup_of;
 use crate::emit::in_object;
-use crate::flow::FlowStep;
+use crate::flow::{FlowStep, FrameChange};
 use crate::kinds::{Known, is_root};
 use crate::objects::{ElementIndex, capture};
 use crate::translate::Translator;
@@ -43,9 +43,14 @@ impl Translator<'_, '_> {
                 Instr::VectorSet { value, .. }
                 | Instr::VectorSetInt { value, .. }
                 | Instr::ArraySet { value, .. } => Some(value.0),
-                Instr::Return { src } => Some(src.0),
+                Instr::Return { src } if step.change == FrameChange::None => Some(src.0),
                 _ => None,
             });
+        }
+        match step.change {
+            FrameChange::None => {}
+            FrameChange::Enter { window, count } => return self.enter_inlined(window, count, step),
+            FrameChange::Return { to } => return self.leave_inlined(to, step),
         }
         match step.instr {
             Instr::Move { dst, src } => {
@@ -348,7 +353,7 @@ impl Translator<'_, '_> {
 
     /// A number stays the one that it is.
     fn load_constant(&mut self, dst: u8, index: usize) {
-        let value = self.source.constants.get(index).copied();
+        let value = self.frame.source.constants.get(index).copied();
         match (self.kinds.of_constant(value.as_ref()), value) {
             (Known::Double, Some(value)) => {
                 let double = self.b.ins().f64const(value.as_double().unwrap_or_default());

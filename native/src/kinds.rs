@@ -17,7 +17,7 @@ use esl_bytecode::opcode::{Instr, RegisterAccess};
 use esl_bytecode::operand::Want;
 use esl_heap::Value;
 
-use crate::flow::{FlowStep, NativeFlow};
+use crate::flow::{FlowStep, FrameChange, NativeFlow};
 use crate::maker::NativeSource;
 use crate::places::RegisterBits;
 
@@ -62,9 +62,9 @@ pub(crate) struct NativeKinds {
 
 impl NativeKinds {
     /// Follows all ways through a function.
-    pub(crate) fn of(flow: &NativeFlow, source: &NativeSource) -> NativeKinds {
+    pub(crate) fn of(flow: &NativeFlow<'_>, source: &NativeSource) -> NativeKinds {
         let mut guesses = source.guesses.clone();
-        guesses.resize(source.registers, Known::Nothing);
+        guesses.resize(flow.registers, Known::Nothing);
         let mut kinds = NativeKinds {
             before: vec![None; flow.steps.len()],
             live: vec![RegisterBits::NONE; flow.steps.len()],
@@ -73,8 +73,8 @@ impl NativeKinds {
             tells_doubles: !source.guesses.is_empty(),
         };
         kinds.find_live(flow);
-        kinds.follow(flow, source.registers, &source.constants);
-        kinds.find_kept_back(flow, &source.constants);
+        kinds.follow(flow);
+        kinds.find_kept_back(flow);
         kinds
     }
 
@@ -92,12 +92,19 @@ impl NativeKinds {
     }
 
     /// Returns the register that an instruction writes, if that is guessed to hold a double then.
-    pub(crate) fn guess(&self, instr: &Instr, before: &[Known]) -> Option<u8> {
-        let is_unknown = |left: u8, right: u8| {
-            let of = |register: u8| before[usize::from(register)];
-            (of(left), of(right)) != (Known::Fixnum, Known::Fixnum)
-        };
-        let dst = match *instr {
+    pub(crate) fn guess(&self, step: &FlowStep, before: &[Known]) -> Option<u8> {
+        let of = |register: u8| before[usize::from(register)];
+        let is_unknown = |left: u8, right: u8| (of(left), of(right)) != (Known::Fixnum, Known::Fixnum);
+        let is_guessed = |register: u8| self.guesses[usize::from(register)] == Known::Double;
+        match step.change {
+            FrameChange::None => {}
+            FrameChange::Enter { .. } => return None,
+            FrameChange::Return { to } => {
+                let value = returned(&step.instr).map_or(Known::Nothing, of);
+                return (value == Known::Nothing && is_guessed(to)).then_some(to);
+            }
+        }
+        let dst = match step.instr {
             Instr::Add { dst, left, right }
             | Instr::Sub { dst, left, right }
             | Instr::Mul { dst, left, right }
@@ -125,7 +132,7 @@ impl NativeKinds {
             }
             _ => return None,
         };
-        (self.guesses[usize::from(dst)] == Known::Double).then_some(dst)
+        is_guessed(dst).then_some(dst)
     }
 
     /// Returns what is known before the instruction at a word that can be reached.
@@ -156,9 +163,9 @@ impl NativeKinds {
         self.kept_back[at]
     }
 
-    fn follow(&mut self, flow: &NativeFlow, registers: usize, constants: &[Value]) {
+    fn follow(&mut self, flow: &NativeFlow<'_>) {
         // What is read before it is written is a parameter.
-        let entry = (0..registers)
+        let entry = (0..flow.registers)
             .map(|register| if self.is_live(0, register) { self.guesses[register] } else { Known::Nothing });
         let entry: Box<[Known]> = entry.collect();
         self.before[0] = Some(entry);
@@ -169,15 +176,14 @@ impl NativeKinds {
             let Some(at) = open.pop() else {
                 let Some(at) = entries.pop() else { break };
                 if self.before[at].is_none() {
-                    self.before[at] = Some(vec![Known::Nothing; registers].into());
+                    self.before[at] = Some(vec![Known::Nothing; flow.registers].into());
                     open.push(at);
                 }
                 continue;
             };
             let (Some(step), Some(mut kinds)) = (&flow.steps[at], self.before[at].clone()) else { continue };
-            self.apply(&step.instr, &mut kinds, constants);
-            let next = step.instr.opcode().falls_through().then_some(step.next);
-            for to in next.into_iter().chain(step.target) {
+            self.apply(flow, step, &mut kinds);
+            for to in step.ways() {
                 if self.meet(flow, to, &kinds) {
                     open.push(to);
                 }
@@ -186,7 +192,7 @@ impl NativeKinds {
     }
 
     /// Takes away what is not known on another way to a word; returns whether that changed anything.
-    fn meet(&mut self, flow: &NativeFlow, to: usize, kinds: &[Known]) -> bool {
+    fn meet(&mut self, flow: &NativeFlow<'_>, to: usize, kinds: &[Known]) -> bool {
         let live = self.live[to];
         // Where only one way leads, what was said before is no longer so: a guess depends on what is not
         // known.
@@ -216,14 +222,16 @@ impl NativeKinds {
     }
 
     /// Follows all ways once more: a register is kept back if it may be on one of them.
-    fn find_kept_back(&mut self, flow: &NativeFlow, constants: &[Value]) {
+    fn find_kept_back(&mut self, flow: &NativeFlow<'_>) {
         let mut has_changed = true;
         while has_changed {
             has_changed = false;
             for (at, step) in flow.steps.iter().enumerate() {
                 let (Some(step), Some(mut kinds)) = (step, self.before[at].clone()) else { continue };
                 let mut kept_back = self.kept_back[at];
-                if window_of(&step.instr).is_some() && !is_root(&step.instr, &kinds) {
+                if let FrameChange::Enter { window, count } = step.change {
+                    kept_back = kept_back.without(dropped(window, count));
+                } else if window_of(&step.instr).is_some() && !is_root(&step.instr, &kinds) {
                     kept_back = RegisterBits::NONE;
                 }
                 step.instr.visit_registers(|access| {
@@ -231,14 +239,16 @@ impl NativeKinds {
                         kept_back.remove_range(usize::from(first), usize::from(count));
                     }
                 });
-                self.apply(&step.instr, &mut kinds, constants);
-                if let Some(dst) = computed(&step.instr)
+                self.apply(flow, step, &mut kinds);
+                if let FrameChange::Return { to } = step.change {
+                    kept_back = kept_back.without(RegisterBits::all_from(to));
+                }
+                if let Some(dst) = computed(step)
                     && kinds[usize::from(dst)] == Known::Double
                 {
                     kept_back.insert(usize::from(dst));
                 }
-                let next = step.instr.opcode().falls_through().then_some(step.next);
-                for to in next.into_iter().chain(step.target) {
+                for to in step.ways() {
                     let mut there = kept_back;
                     for (register, known) in self.before(to).iter().enumerate() {
                         if !matches!(known, Known::Double | Known::Spent) {
@@ -251,7 +261,7 @@ impl NativeKinds {
         }
     }
 
-    fn find_live(&mut self, flow: &NativeFlow) {
+    fn find_live(&mut self, flow: &NativeFlow<'_>) {
         let mut has_changed = true;
         while has_changed {
             has_changed = false;
@@ -266,9 +276,13 @@ impl NativeKinds {
 
     fn live_before(&self, step: &FlowStep) -> RegisterBits {
         let mut live = RegisterBits::NONE;
-        let next = step.instr.opcode().falls_through().then_some(step.next);
-        for to in next.into_iter().chain(step.target) {
+        for to in step.ways() {
             live.unite(self.live[to]);
+        }
+        match step.change {
+            FrameChange::None => {}
+            FrameChange::Enter { window, count } => return live.without(dropped(window, count)),
+            FrameChange::Return { to } => live = live.without(RegisterBits::all_from(to)),
         }
         step.instr.visit_registers(|access| {
             if let RegisterAccess::Write { first, count } = access {
@@ -287,14 +301,28 @@ impl NativeKinds {
     }
 
     /// Makes what is known before an instruction what is known behind it.
-    fn apply(&self, instr: &Instr, kinds: &mut [Known], constants: &[Value]) {
-        let guess = self.guess(instr, kinds);
+    fn apply(&self, flow: &NativeFlow<'_>, step: &FlowStep, kinds: &mut [Known]) {
+        let (instr, guess) = (&step.instr, self.guess(step, kinds));
+        match step.change {
+            FrameChange::None => {}
+            FrameChange::Enter { window, count } => {
+                forget_all(kinds, dropped(window, count));
+                return;
+            }
+            FrameChange::Return { to } => {
+                let value = returned(instr).map_or(Known::Nothing, |register| kinds[usize::from(register)]);
+                forget_all(kinds, RegisterBits::all_from(to));
+                kinds[usize::from(to)] = if guess == Some(to) { Known::Double } else { value };
+                return;
+            }
+        }
         if let Some((window, _)) = window_of(instr)
             && is_root(instr, kinds)
         {
             kinds[usize::from(window)] = Known::Double;
             return;
         }
+        let constants = &flow.frames[step.frame].source.constants;
         apply(instr, kinds, |index| self.of_constant(constants.get(index)));
         if let Some(register) = guess {
             kinds[usize::from(register)] = Known::Double;
@@ -303,8 +331,12 @@ impl NativeKinds {
 }
 
 /// Returns the register that an instruction computes, if it is one that keeps a double back.
-fn computed(instr: &Instr) -> Option<u8> {
-    match *instr {
+fn computed(step: &FlowStep) -> Option<u8> {
+    match step.instr {
+        Instr::Return { .. } | Instr::ReturnValues { .. } => match step.change {
+            FrameChange::Return { to } => returned(&step.instr).map(|_| to),
+            _ => None,
+        },
         Instr::Move { dst, .. }
         | Instr::LoadConst { dst, .. }
         | Instr::Add { dst, .. }
@@ -328,6 +360,31 @@ pub(crate) fn is_root(instr: &Instr, before: &[Known]) -> bool {
                 && before[usize::from(window.0) + 2] == Known::Double
         }
         _ => false,
+    }
+}
+
+/// Returns the register that holds the only value that an instruction returns.
+pub(crate) fn returned(instr: &Instr) -> Option<u8> {
+    match *instr {
+        Instr::Return { src } => Some(src.0),
+        Instr::ReturnValues { first, count } if count.0 == 1 => Some(first.0),
+        _ => None,
+    }
+}
+
+/// Returns the registers that a call of an inlined function gives up: all from its window on but the
+/// arguments.
+pub(crate) fn dropped(window: u8, count: u8) -> RegisterBits {
+    let mut dropped = RegisterBits::all_from(window);
+    dropped.remove_range(usize::from(window) + 2, usize::from(count));
+    dropped
+}
+
+fn forget_all(kinds: &mut [Known], registers: RegisterBits) {
+    for (register, known) in kinds.iter_mut().enumerate() {
+        if registers.contains(register) {
+            *known = Known::Nothing;
+        }
     }
 }
 

@@ -11,8 +11,9 @@
 //! * **N3, truth.** Where machine code is left, and before it calls anything, all results are in the task's
 //!   stack. So whatever the machine code leaves can be taken up by the interpreter, at the instruction that
 //!   [`NativeContext::pc`] names in the frame [`NativeContext::base`]. Between, doubles may be kept back.
-//!   On a way out they are put aside, as they are; [`NativeContext::put_aside`] names them, and the machine
-//!   writes their words to the stack before anything else looks.
+//!   On a way out they are put aside, as they are; [`NativeContext::put_aside`] names them by their distance
+//!   from [`NativeContext::outer`], and the machine writes their words to the stack before anything else
+//!   looks.
 //!   Where the function returns, they are no more; other words without an address are in their places.
 //!   Functions of the machine that look at no frame may be called while some are kept back.
 //! * **N4, exits.** Machine code is left at the beginning of an instruction, before it has had any effect
@@ -26,6 +27,10 @@
 //!   while nothing is marked ([`NativeContext::is_marking`]), or where it holds no address.
 //! * **N7, native stack.** A frame of machine code holds nothing that another one needs. There are as many as
 //!   fit between the base at the entry and [`NativeContext::limit`], which the interpreter keeps near.
+//! * **N8, inlined functions.** A call of a global function may be replaced by the instructions of the
+//!   function. Its frame is made all the same, so that N3 to N5 hold within it. The call is given up, with
+//!   [`REDEFINED`], if the symbol has another function by then. So the machine code is good only as long as
+//!   the functions inlined in it are there.
 //!
 //! The code is in memory that is either writable or executable, never both. It is given back when the
 //! [`MachineCode`] is dropped: whoever keeps it must not drop it while it runs.
@@ -40,6 +45,7 @@ mod doubles;
 mod emit;
 mod flow;
 pub mod helper;
+mod inlined;
 mod instruction;
 mod kinds;
 pub mod maker;
@@ -48,7 +54,10 @@ mod places;
 mod special;
 mod translate;
 
-pub use abi::{AGAIN, GUESSED_WRONG, IN_PLACE, NativeContext, NativeReply, RETURN_VALUES, RETURNED, SIGNAL};
+pub use abi::{
+    AGAIN, GUESSED_WRONG, IN_PLACE, NativeContext, NativeReply, REDEFINED, RETURN_VALUES, RETURNED, SIGNAL,
+};
+pub use flow::{MAX_INLINED, may_be_inlined};
 pub use helper::{MachineCodeHelper, MadeCode};
 pub use kinds::Known;
-pub use maker::{MachineCode, MachineCodeMaker, NativeSource, NotMade};
+pub use maker::{FunctionSource, InlinedSource, MachineCode, MachineCodeMaker, NativeSource, NotMade};

@@ -19,9 +19,9 @@ use crate::translate::Translator;
 /// Most words of a function that is translated; longer ones are left to the interpreter.
 pub const MAX_WORDS: usize = 4000;
 
-/// What is translated: see N1.
+/// The code of a function: see N1.
 #[derive(Clone, Debug)]
-pub struct NativeSource {
+pub struct FunctionSource {
     /// The instructions, none of them fused.
     pub words: Vec<u32>,
     /// Address of the first of them, where the interpreter runs them.
@@ -32,6 +32,28 @@ pub struct NativeSource {
     pub constants: Vec<Value>,
     /// Number of registers.
     pub registers: usize,
+}
+
+/// A global function that may be inlined: see N8.
+#[derive(Clone, Debug)]
+pub struct InlinedSource {
+    /// The symbol that names it.
+    pub symbol: Value,
+    /// The function of the symbol.
+    pub callee: Value,
+    /// Number of its parameters, all of them required.
+    pub arity: u8,
+    /// Its code, for which [`may_be_inlined`](crate::may_be_inlined) holds.
+    pub function: FunctionSource,
+}
+
+/// What is translated.
+#[derive(Clone, Debug)]
+pub struct NativeSource {
+    /// The function.
+    pub function: FunctionSource,
+    /// Functions that it calls, or that these call.
+    pub inlined: Vec<InlinedSource>,
     /// What the registers held when this was taken, from which it is guessed what they will hold. May be
     /// shorter than the registers, and may be wrong: then the machine code is left with
     /// [`GUESSED_WRONG`](crate::abi::GUESSED_WRONG).
@@ -88,10 +110,10 @@ impl MachineCodeMaker {
     }
 
     fn translate(&mut self, source: &NativeSource) -> Result<MachineCode, NotMade> {
-        if source.words.len() > MAX_WORDS {
+        if source.function.words.len() > MAX_WORDS {
             return Err(NotMade::Unfit);
         }
-        let flow = NativeFlow::of(&source.words).ok_or(NotMade::Unfit)?;
+        let flow = NativeFlow::of(source).ok_or(NotMade::Unfit)?;
         let unsupported = |error: ModuleError| NotMade::Unsupported(error.to_string());
         let isa: Arc<dyn TargetIsa> = self.isa.clone();
         let mut module = JITModule::new(JITBuilder::with_isa(isa, default_libcall_names()));
@@ -123,7 +145,7 @@ impl MachineCodeMaker {
         let address = module.get_finalized_function(id);
         // SAFETY: the function was declared with the signature of an entry, and is finished.
         let entry = unsafe { std::mem::transmute::<*const u8, NativeEntry>(address) };
-        let said = if cfg!(debug_assertions) { kinds.into_said() } else { Vec::new() };
+        let said = if cfg!(debug_assertions) { SaidFrame::of(&flow, kinds) } else { Vec::new() };
         Ok(MachineCode { module: Some(module), entry, bytes, loops: flow.loops, said })
     }
 }
@@ -142,8 +164,41 @@ pub struct MachineCode {
     entry: NativeEntry,
     bytes: usize,
     loops: Vec<usize>,
-    /// What is known of the registers before each instruction; in debug builds only.
+    /// The function and what is inlined in it; in debug builds only.
+    said: Vec<SaidFrame>,
+}
+
+/// What is known of registers in the frame of a function, or of an inlined one.
+struct SaidFrame {
+    /// Address of its first instruction.
+    words_at: u64,
+    /// Registers of the frames below.
+    base: usize,
+    /// What is known of the registers before each of its instructions.
     said: Vec<Option<Box<[Known]>>>,
+}
+
+impl SaidFrame {
+    fn of(flow: &NativeFlow<'_>, kinds: NativeKinds) -> Vec<SaidFrame> {
+        let mut said = kinds.into_said().into_iter();
+        let frames = flow.frames.iter().map(|frame| SaidFrame {
+            words_at: frame.source.words_at,
+            base: usize::from(frame.base),
+            said: said.by_ref().take(frame.source.words.len()).collect(),
+        });
+        frames.collect()
+    }
+
+    /// Returns whether machine code may have been left at an instruction with these registers.
+    fn allows(&self, pc: u64, base: usize, registers: &[Value]) -> bool {
+        let at = pc.checked_sub(self.words_at).map(|bytes| bytes as usize / size_of::<u32>());
+        let Some(Some(said)) = at.and_then(|at| self.said.get(at)) else { return false };
+        let is_other = |&(&known, &value): &(&Known, &Value)| match known {
+            Known::Fixnum | Known::Double => Known::of(value) != known,
+            Known::Nothing | Known::Spent => false,
+        };
+        base == self.base && said.iter().zip(registers).filter(is_other).count() <= 1
+    }
 }
 
 impl MachineCode {
@@ -157,19 +212,12 @@ impl MachineCode {
         self.bytes
     }
 
-    /// Returns whether machine code may have been left at the instruction at a word with these registers, as
-    /// far as that is known: it is an instruction that can be reached, and the registers hold what they are
-    /// known to hold there. One may be something else, which is why it was left. Always in release builds.
-    pub fn may_be_left(&self, at: usize, registers: &[Value]) -> bool {
-        if self.said.is_empty() {
-            return true;
-        }
-        let Some(Some(said)) = self.said.get(at) else { return false };
-        let is_other = |&(&known, &value): &(&Known, &Value)| match known {
-            Known::Fixnum | Known::Double => Known::of(value) != known,
-            Known::Nothing | Known::Spent => false,
-        };
-        said.len() == registers.len() && said.iter().zip(registers).filter(is_other).count() <= 1
+    /// Returns whether machine code may have been left at the instruction at the address `pc`, in a frame
+    /// `base` registers above that of the function, with these registers from there on: as far as that is
+    /// known, it is an instruction that can be reached, and the registers hold what they are known to hold
+    /// there. One may be something else, which is why it was left. Always in release builds.
+    pub fn may_be_left(&self, pc: u64, base: usize, registers: &[Value]) -> bool {
+        self.said.is_empty() || self.said.iter().any(|frame| frame.allows(pc, base, registers))
     }
 
     /// Returns the words of the loop instructions at which it may be entered, the first at place 1.

@@ -141,8 +141,7 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn capture(&mut self, index: u8) -> Ssa {
-        let base = self.base;
-        let function = self.load(base, -2 * WORD);
+        let function = self.running();
         self.load(function, capture(index))
     }
 

@@ -7,6 +7,13 @@ pub(crate) struct RegisterBits([u64; 4]);
 impl RegisterBits {
     pub(crate) const NONE: RegisterBits = RegisterBits([0; 4]);
 
+    /// Returns the registers from `first` on.
+    pub(crate) fn all_from(first: u8) -> RegisterBits {
+        let mut registers = RegisterBits::NONE;
+        registers.insert_range(usize::from(first), 256 - usize::from(first));
+        registers
+    }
+
     pub(crate) fn contains(self, register: usize) -> bool {
         self.0.get(register / 64).is_some_and(|word| word >> (register % 64) & 1 != 0)
     }
@@ -29,6 +36,11 @@ impl RegisterBits {
 
     pub(crate) fn remove_range(&mut self, first: usize, count: usize) {
         (first..first + count).for_each(|register| self.remove(register));
+    }
+
+    /// Returns those that are in `others` too.
+    pub(crate) fn within(self, others: RegisterBits) -> RegisterBits {
+        self.without(RegisterBits(others.0.map(|word| !word)))
     }
 
     /// Returns those that are not in `others`.

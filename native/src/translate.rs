@@ -1,7 +1,7 @@
 //! The translation of a function: its entries and blocks, and what is known of its registers.
 //!
-//! Each register of the frame is a variable of the code generator, and every write goes to the stack as well,
-//! but for doubles that are kept back (N3).
+//! Each register of the frame, and of the frames of inlined functions, is a variable of the code generator,
+//! and every write goes to the stack as well, but for doubles that are kept back (N3).
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -16,7 +16,7 @@ use crate::abi::GUESSED_WRONG;
 use crate::arithmetic::Arithmetic;
 use crate::doubles::{DoubleBatch, EdgeWork};
 use crate::emit::WORD;
-use crate::flow::{FlowStep, NativeFlow};
+use crate::flow::{FlowFrame, FlowStep, NativeFlow};
 use crate::kinds::{Known, NativeKinds};
 use crate::maker::NativeSource;
 use crate::places::{RegisterBits, WayOut};
@@ -25,7 +25,7 @@ use crate::places::{RegisterBits, WayOut};
 pub(crate) struct Translator<'a, 'f> {
     pub(crate) b: FunctionBuilder<'f>,
     pub(crate) source: &'a NativeSource,
-    flow: &'a NativeFlow,
+    pub(crate) flow: &'a NativeFlow<'a>,
     pub(crate) kinds: &'a NativeKinds,
     /// The function itself, for calls.
     pub(crate) itself: FuncRef,
@@ -60,6 +60,8 @@ pub(crate) struct Translator<'a, 'f> {
     pub(crate) at: usize,
     /// Word behind it.
     pub(crate) next: usize,
+    /// Its frame.
+    pub(crate) frame: FlowFrame<'a>,
     /// The register that is guessed to hold a double behind it.
     pub(crate) guess: Option<u8>,
     /// Whether control goes on behind the instruction.
@@ -71,7 +73,7 @@ impl<'a, 'f> Translator<'a, 'f> {
     pub(crate) fn new(
         mut b: FunctionBuilder<'f>,
         source: &'a NativeSource,
-        (flow, kinds): (&'a NativeFlow, &'a NativeKinds),
+        (flow, kinds): (&'a NativeFlow<'a>, &'a NativeKinds),
         itself: FuncRef,
         pointer: Type,
     ) -> Self {
@@ -84,8 +86,8 @@ impl<'a, 'f> Translator<'a, 'f> {
         };
         let (helper, store, entry) = (signature(3, 1), signature(3, 0), signature(3, 2));
         let (read, lookup) = (signature(2, 1), signature(5, 1));
-        let variables: Vec<Variable> = (0..source.registers).map(|_| b.declare_var(types::I64)).collect();
-        let doubles: Vec<Variable> = (0..source.registers).map(|_| b.declare_var(types::F64)).collect();
+        let variables: Vec<Variable> = (0..flow.registers).map(|_| b.declare_var(types::I64)).collect();
+        let doubles: Vec<Variable> = (0..flow.registers).map(|_| b.declare_var(types::F64)).collect();
         let first = b.create_block();
         b.append_block_params_for_function_params(first);
         b.switch_to_block(first);
@@ -99,9 +101,9 @@ impl<'a, 'f> Translator<'a, 'f> {
             pointer,
             context,
             base,
-            known: vec![Known::Nothing; source.registers],
+            known: vec![Known::Nothing; flow.registers],
             kept_back: RegisterBits::NONE,
-            words: vec![None; source.registers],
+            words: vec![None; flow.registers],
             batch: None,
             results: HashMap::new(),
             lengths: HashMap::new(),
@@ -118,6 +120,7 @@ impl<'a, 'f> Translator<'a, 'f> {
             entry_signature: entry,
             at: 0,
             next: 0,
+            frame: flow.frames[0],
             guess: None,
             is_open: false,
         }
@@ -228,8 +231,8 @@ impl<'a, 'f> Translator<'a, 'f> {
             self.lengths.clear();
         }
         self.known.copy_from_slice(self.kinds.before(at));
-        (self.at, self.next) = (at, step.next);
-        self.guess = self.kinds.guess(&step.instr, &self.known);
+        (self.at, self.next, self.frame) = (at, step.next, self.flow.frames[step.frame]);
+        self.guess = self.kinds.guess(step, &self.known);
     }
 
     /// Notes that control does not go on behind the instruction.

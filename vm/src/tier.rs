@@ -3,7 +3,7 @@
 //! No program can see the difference, in no value, tick or turn. So nothing here is state of a run.
 
 #[cfg(feature = "native")]
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 #[cfg(feature = "native")]
 use esl_native::abi::EntryStub;
@@ -49,10 +49,9 @@ pub(crate) struct CompiledFunctions {
     /// Makes machine code on a thread of its own: for [`Tier::Auto`].
     #[cfg(feature = "native")]
     pub(crate) helper: Option<MachineCodeHelper>,
-    /// The code that machine code was asked for, by its value's word, and whether guesses are made, by the
-    /// number of the order.
+    /// What machine code was asked for, by the number of the order.
     #[cfg(feature = "native")]
-    pub(crate) asked: HashMap<u64, (u64, bool)>,
+    pub(crate) asked: HashMap<u64, CodeOrder>,
     /// Number of the last order.
     #[cfg(feature = "native")]
     pub(crate) orders: u64,
@@ -65,6 +64,21 @@ pub(crate) struct CompiledFunctions {
     /// How often codes were found running.
     #[cfg(feature = "native")]
     pub(crate) heat: Heat,
+    /// The symbols, by their words, whose functions were inlined and then redefined: these are not inlined
+    /// again.
+    #[cfg(feature = "native")]
+    pub(crate) redefined: HashSet<u64>,
+}
+
+/// An order of machine code.
+#[cfg(feature = "native")]
+pub(crate) struct CodeOrder {
+    /// The code, by its value's word.
+    pub(crate) code: u64,
+    /// Whether guesses are made of what registers hold.
+    pub(crate) has_guesses: bool,
+    /// The functions that may be inlined in it, by their words.
+    pub(crate) inlined: Box<[u64]>,
 }
 
 /// How often codes were found running, by their addresses. A code that was not met for long may be forgotten
@@ -95,6 +109,11 @@ impl Heat {
         place.1
     }
 
+    /// Forgets the count of a code.
+    pub(crate) fn forget(&mut self, code: u64) {
+        self.places.iter_mut().filter(|place| place.0 == code).for_each(|place| *place = (0, 0));
+    }
+
     /// Forgets all counts.
     pub(crate) fn clear(&mut self) {
         self.places.clear();
@@ -108,11 +127,9 @@ pub(crate) struct InstalledCode {
     pub(crate) stub: Box<EntryStub>,
     /// The machine code.
     pub(crate) made: MachineCode,
-    /// The code, by its value's word.
-    pub(crate) code: u64,
-    /// Whether guesses were made of what registers hold.
-    pub(crate) has_guesses: bool,
-    /// How often they were wrong.
+    /// What was asked for.
+    pub(crate) order: CodeOrder,
+    /// How often guesses were wrong.
     pub(crate) wrong: u32,
     /// How its loop instructions are used, in the order of [`MachineCode::loops`].
     pub(crate) loops: Box<[LoopUse]>,

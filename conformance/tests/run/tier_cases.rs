@@ -27,7 +27,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 ";
 
 /// Name and text of each.
-const CASES: [(&str, &str); 11] = [
+const CASES: [(&str, &str); 13] = [
     (
         "functions redefined while they run",
         "(defun step-of (x) (+ x 1))
@@ -44,6 +44,63 @@ const CASES: [(&str, &str); 11] = [
            (when (= n 40) (setf (symbol-function 'again) (lambda (n) (list :new n))))
            (if (= n 0) :old (again (- n 1))))
          (print (again 100)) (print (again 3))",
+    ),
+    (
+        "small functions within each other",
+        "(defun id (x) x)
+         (defun both (x) (values x (list x)))
+         (defun none () (values))
+         (defun tail (x y) (list y x))
+         (defun third-of (x) (floor x 3))
+         (defun in-place (x) (third-of (+ x 1)))
+         (defun given (f x) (funcall f x))
+         (defun two (x y) (+ (id x) (id y)))
+         (defun four (x y) (* (two x 0.5) (two (id y) x)))
+         (defun eight (x y) (- (four x y) (four y x)))
+         (defun looked-up (table x) (gethash x table :none))
+         (defun closed (f) (funcall f))
+         (defun failing (x) (if (= x 77) (error \"no ~a\" x) (- x 0.5)))
+         (let ((count 0)) (defun counted (x) (incf count x) count))
+         (defvar *level* 0.5)
+         (defun bound (x) (let ((*level* (+ *level* x))) (two *level* x)))
+         (defun even-p (n) (if (= n 0) t (odd-p (- n 1))))
+         (defun odd-p (n) (if (= n 0) nil (even-p (- n 1))))
+         (defun run (n)
+           (let ((sum 0.0) (seen nil) (table (make-hash-table)))
+             (setf (gethash 3 table) 0.25)
+             (dotimes (i n)
+               (setq sum (+ (* sum 0.5) (eight sum i) (in-place i) (bound 0.25)))
+               (setq seen (tail (both (none)) (given #'id (looked-up table i))))
+               (setq sum (+ (handler-case (failing i) (error () (* sum 0.25))) (id (counted 1)) (* sum 0.001)))
+               (when (even-p (mod i 9)) (setq seen (cons (closed (lambda () sum)) (id seen))))
+               (when (< 1.0e200 sum) (setq sum 1.0)))
+             (list sum seen)))
+         (print (run 3)) (print (run 200)) (print (multiple-value-list (both 1)))",
+    ),
+    (
+        "small functions of which one fails, sleeps, or is collected",
+        "(defun nap (x) (sleep 1) x)
+         (defun inner (x) (+ x 0.5 (nap 0.25)))
+         (defun middle (x) (* 2.0 (inner (* x 0.5))))
+         (defun outer (n) (let ((sum 0.0)) (dotimes (i n) (setq sum (+ sum (middle i)))) sum))
+         (print (outer 40))
+         (print (mapcar #'wait-for-task (list (spawn (outer 7)) (spawn (outer 9)))))
+         (defun vector-of (x) (vector x (* x 2.0)))
+         (defun first-of (v) (svref v 0))
+         (defun kept (n)
+           (let ((last nil) (sum 0.0))
+             (dotimes (i n)
+               (let ((v (vector-of (+ sum 0.5)))) (setq sum (first-of v) last v)))
+             (list sum last)))
+         (print (kept 2000))
+         (defun small (x) (+ x 1))
+         (defun caller (n) (let ((sum 0)) (dotimes (i n) (setq sum (small sum))) sum))
+         (print (caller 50))
+         (dotimes (i 30)
+           (eval `(defun small (x) (+ x ,i)))
+           (make-array 30000)
+           (print (caller 50)))
+         (print (handler-case (progn (fmakunbound 'small) (caller 3)) (error (e) (type-of e))))",
     ),
     (
         "recursion deeper than the frames of one entry",

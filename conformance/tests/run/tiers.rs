@@ -18,6 +18,9 @@ use libtest_mimic::{Failed, Trial};
 /// Random programs in each test of them.
 const PROGRAMS: u64 = 8;
 
+/// Small functions in a random program.
+const SMALL: u64 = 6;
+
 /// What of a run does not depend on how functions run.
 #[derive(Debug, PartialEq)]
 pub(super) struct TierOutcome {
@@ -175,12 +178,34 @@ impl RandomNumbers {
         from[self.below(from.len() as u64) as usize]
     }
 
+    /// Returns the body of a small function, which may call those before it.
+    fn small(&mut self, number: u64) -> String {
+        let (x, y) = (self.leaf(), self.leaf());
+        let value = match self.below(7) {
+            0 => format!("(* (- {x} {y}) 0.5)"),
+            1 => format!("(if (< {x} {y}) (+ {x} 1) {y})"),
+            2 => format!("(floor {x} 3)"),
+            3 => format!("(max {x} {y})"),
+            4 => format!("(let ((c (* {x} 1.5)) (d (+ {y} 0.25))) (+ (* c d) (- c d)))"),
+            5 => format!("(values (+ {x} 0.5) {y})"),
+            _ => format!("(sqrt (* {y} {y} 1.0))"),
+        };
+        match (number, self.below(3)) {
+            (0, _) | (_, 0) => value,
+            (_, 1) => format!("(g{} {x} {value})", self.below(number)),
+            _ => format!("(+ 0.125 (g{} {value} {y}))", self.below(number)),
+        }
+    }
+
     /// Returns functions, and calls of them that print what they return or how they fail.
     fn program(mut self) -> String {
         let mut text = String::from(
             "(defun tame (v) (if (< -1000000000000000000000 v 1000000000000000000000) v 7))\n\
              (defun f0 (a b) (+ (* a 2) b))\n",
         );
+        for number in 0..SMALL {
+            let _ = writeln!(text, "(defun g{number} (a b) {})", self.small(number));
+        }
         for number in 1..=4 {
             let _ = writeln!(text, "(defun f{number} (a b)");
             let before = number - 1;
@@ -196,9 +221,18 @@ impl RandomNumbers {
             for _ in 0..1 + self.below(4) {
                 let variable = self.pick(&["x", "y", "s"]);
                 let (value, test) = (self.expression(3), self.test());
-                let _ = match self.below(3) {
-                    0 => writeln!(text, "      (setq {variable} (tame {value}))"),
-                    1 => writeln!(text, "      (when {test} (setq {variable} (tame {value})))"),
+                let _ = match self.below(7) {
+                    0 | 1 => writeln!(text, "      (setq {variable} (tame {value}))"),
+                    // By one of those before it, lest it call itself.
+                    2 => {
+                        let (turn, number) = (self.below(20), self.below(SMALL));
+                        let other = self.below(number + 1);
+                        writeln!(
+                            text,
+                            "      (when (= i {turn}) (setf (symbol-function 'g{number}) #'g{other}))"
+                        )
+                    }
+                    3 | 4 => writeln!(text, "      (when {test} (setq {variable} (tame {value})))"),
                     _ => writeln!(text, "      (incf {variable} {})", self.leaf()),
                 };
             }
@@ -237,7 +271,7 @@ impl RandomNumbers {
             };
         }
         let (x, y) = (self.expression(depth - 1), self.expression(depth - 1));
-        match self.below(12) {
+        match self.below(16) {
             0 | 1 => format!("(+ {x} {y})"),
             2 => format!("(- {x} {y})"),
             3 => format!("(* {x} {y})"),
@@ -248,7 +282,8 @@ impl RandomNumbers {
             8 => format!("(if {} {x} {y})", self.test()),
             9 => format!("(svref (vector {x} {y}) 1)"),
             10 => format!("(logand (floor {x}) 255)"),
-            _ => format!("(f0 {x} {y})"),
+            11 => format!("(f0 {x} {y})"),
+            _ => format!("(g{} {x} {y})", self.below(SMALL)),
         }
     }
 }

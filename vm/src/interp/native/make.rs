@@ -1,19 +1,31 @@
 //! Making machine code of a function, here or on another thread, and installing it.
 
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::operand::Want;
 use esl_native::abi::EntryStub;
 use esl_native::maker::MAX_WORDS;
-use esl_native::{Known, MachineCode, MachineCodeHelper, MachineCodeMaker, NativeSource, NotMade};
+use esl_native::{
+    FunctionSource, InlinedSource, Known, MAX_INLINED, MachineCode, MachineCodeHelper, MachineCodeMaker,
+    NativeSource, NotMade, may_be_inlined,
+};
 
 use super::super::{code_of, constants_of, first_instruction, stubs};
-use super::rouse_loops;
+use super::{MAKE_AT_ENTRY, calm_loop, rouse_loops};
 use crate::fused::{quicken_loop, unfused};
-use crate::heap::layout::CodeObject;
-use crate::tier::{CompiledFunctions, InstalledCode, LoopUse, Tier};
+use crate::heap::layout::{CodeObject, Kind, SymbolObject};
+use crate::shape::Shape;
+use crate::tier::{CodeOrder, CompiledFunctions, InstalledCode, LoopUse, Tier};
 use crate::value::Value;
 use crate::vm::Vm;
 
 /// Most bytes of machine code of one machine.
 const MOST_BYTES: usize = 32 << 20;
+
+/// Calls of functions within each other that may be inlined.
+const MAX_DEPTH: usize = 3;
+
+/// Most functions that are offered to be inlined in one.
+const MAX_CALLEES: usize = 32;
 
 /// Makes machine code of the running function at its first call; puts back the way to its first instruction
 /// if none is made.
@@ -51,10 +63,12 @@ pub(super) unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known
         }
         let has_guesses = !guesses.is_empty();
         let word = Value::from_object(code.cast()).bits();
-        if compiled.asked.values().any(|&asked| asked == (word, has_guesses)) {
+        if compiled.asked.values().any(|order| (order.code, order.has_guesses) == (word, has_guesses)) {
             return;
         }
-        let source = source_of(code, guesses);
+        let source = source_of(compiled, code, guesses);
+        let inlined = source.inlined.iter().map(|inlined| inlined.callee.bits()).collect();
+        let order = CodeOrder { code: word, has_guesses, inlined };
         if compiled.tier == Tier::Native {
             let maker = match &mut compiled.maker {
                 Some(maker) => Ok(maker),
@@ -65,7 +79,7 @@ pub(super) unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known
                 Err(reason) => (Err(reason), Default::default()),
             };
             compiled.report.nanoseconds += duration.as_nanos() as u64;
-            install(compiled, code, has_guesses, result);
+            install(compiled, order, result);
             return;
         }
         let helper = match &mut compiled.helper {
@@ -75,10 +89,10 @@ pub(super) unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known
         match helper {
             Ok(helper) => {
                 compiled.orders += 1;
-                compiled.asked.insert(compiled.orders, (word, has_guesses));
+                compiled.asked.insert(compiled.orders, order);
                 helper.ask(compiled.orders, source);
             }
-            Err(reason) => install(compiled, code, has_guesses, Err(reason)),
+            Err(reason) => install(compiled, order, Err(reason)),
         }
     }
 }
@@ -88,10 +102,10 @@ pub(super) fn install_made(compiled: &mut CompiledFunctions) {
     while let Some(made) = compiled.helper.as_ref().and_then(MachineCodeHelper::take) {
         compiled.report.nanoseconds += made.duration.as_nanos() as u64;
         // The code may be gone.
-        let Some((code, has_guesses)) = compiled.asked.remove(&made.order) else { continue };
+        let Some(order) = compiled.asked.remove(&made.order) else { continue };
         // SAFETY: the word was made of the address of a Code, which is there: else the order was forgotten
         // when all that is reached had been marked.
-        unsafe { install(compiled, Value::from_bits(code).object_ptr().cast(), has_guesses, made.result) };
+        unsafe { install(compiled, order, made.result) };
     }
 }
 
@@ -111,17 +125,83 @@ pub(super) unsafe fn instructions<'a>(code: *mut CodeObject) -> &'a [u32] {
 ///
 /// # Safety
 /// `code` points to a Code of bytecode.
-unsafe fn source_of(code: *mut CodeObject, guesses: Vec<Known>) -> NativeSource {
+unsafe fn source_of(
+    compiled: &CompiledFunctions,
+    code: *mut CodeObject,
+    guesses: Vec<Known>,
+) -> NativeSource {
+    // SAFETY: by the contract this is a live Code; `inlined_by` returns functions of live ones.
+    unsafe {
+        let function = function_source(code);
+        let mut inlined = Vec::new();
+        let mut callers = vec![function.clone()];
+        for _ in 0..MAX_DEPTH {
+            let mut callees = Vec::new();
+            for caller in &callers {
+                inlined_by(compiled, caller, &mut inlined, &mut callees);
+            }
+            callers = callees;
+        }
+        NativeSource { function, inlined, guesses, entry_word: u32::from(stubs::NATIVE_ENTRY) }
+    }
+}
+
+/// Returns the code of a function as it is translated.
+///
+/// # Safety
+/// `code` points to a Code of bytecode.
+unsafe fn function_source(code: *mut CodeObject) -> FunctionSource {
     // SAFETY: by the contract this is a live Code.
     unsafe {
-        NativeSource {
+        FunctionSource {
             words: unfused(instructions(code)),
             words_at: first_instruction(code).expose_provenance() as u64,
             constants_at: constants_of(code).expose_provenance() as u64,
             constants: std::slice::from_raw_parts(constants_of(code), (*code).nconsts as usize).to_vec(),
             registers: (*code).nregs as usize,
-            guesses,
-            entry_word: u32::from(stubs::NATIVE_ENTRY),
+        }
+    }
+}
+
+/// Finds the functions that may be inlined where a function calls them.
+///
+/// # Safety
+/// The function is that of a live Code.
+unsafe fn inlined_by(
+    compiled: &CompiledFunctions,
+    caller: &FunctionSource,
+    inlined: &mut Vec<InlinedSource>,
+    callees: &mut Vec<FunctionSource>,
+) {
+    let mut at = 0;
+    while let Some(instr) = Instr::decode(&caller.words, at) {
+        at += instr.opcode().words();
+        let Instr::CallGlobal { count, want: Want::ONE, symbol, .. } = instr else { continue };
+        let Some(&symbol) = caller.constants.get(symbol.0 as usize) else { continue };
+        if inlined.len() == MAX_CALLEES
+            || compiled.redefined.contains(&symbol.bits())
+            || inlined.iter().any(|known| known.symbol == symbol)
+        {
+            continue;
+        }
+        // SAFETY: V4: the constant is a symbol; its function is a Function if it is an object of that kind.
+        unsafe {
+            let callee = (*symbol.object_ptr().cast::<SymbolObject>()).function;
+            if !callee.is_object() || (*callee.object_ptr()).kind != Kind::Function {
+                continue;
+            }
+            let code = code_of(callee);
+            if (*code).arity != u32::from(count.0) || !Shape::is_bytecode((*code).spare[0]) {
+                continue;
+            }
+            if instructions(code).len() > MAX_INLINED {
+                continue;
+            }
+            let function = function_source(code);
+            if function.words_at != caller.words_at && may_be_inlined(&function.words) {
+                callees.push(function.clone());
+                inlined.push(InlinedSource { symbol, callee, arity: count.0, function });
+            }
         }
     }
 }
@@ -129,13 +209,9 @@ unsafe fn source_of(code: *mut CodeObject, guesses: Vec<Known>) -> NativeSource 
 /// Makes calls and loops of a code lead to machine code, or notes why there is none.
 ///
 /// # Safety
-/// `code` points to a Code of bytecode, and the machine code is made of it.
-pub(super) unsafe fn install(
-    compiled: &mut CompiledFunctions,
-    code: *mut CodeObject,
-    has_guesses: bool,
-    result: Result<MachineCode, NotMade>,
-) {
+/// The code of the order is a live Code of bytecode, its functions are there, and the machine code is made of
+/// them.
+unsafe fn install(compiled: &mut CompiledFunctions, order: CodeOrder, result: Result<MachineCode, NotMade>) {
     let made = match result {
         Ok(made) => made,
         Err(NotMade::Unfit) => return,
@@ -146,13 +222,14 @@ pub(super) unsafe fn install(
     };
     // SAFETY: by the contract this is a live Code, and nobody holds a reference to its words.
     unsafe {
+        let code = Value::from_bits(order.code).object_ptr().cast::<CodeObject>();
         let words = instructions(code).len();
         let words = std::slice::from_raw_parts_mut(first_instruction(code).cast_mut(), words);
         if *(*code).entry == u32::from(stubs::NATIVE_ENTRY) {
             // Its guesses were wrong.
             let number = (*(*code).entry.cast::<EntryStub>()).number as usize;
             let old = compiled.installed.get_mut(number).and_then(Option::as_mut);
-            if let Some(old) = old.filter(|old| old.has_guesses && !has_guesses) {
+            if let Some(old) = old.filter(|old| old.order.has_guesses && !order.has_guesses) {
                 for &at in made.loops() {
                     quicken_loop(words, at);
                 }
@@ -161,7 +238,7 @@ pub(super) unsafe fn install(
                 compiled.report.bytes += made.bytes().next_multiple_of(4096);
                 compiled.report.bytes -= old.made.bytes().next_multiple_of(4096);
                 old.made = made;
-                old.has_guesses = false;
+                old.order = order;
             }
             return;
         }
@@ -178,10 +255,34 @@ pub(super) unsafe fn install(
             quicken_loop(words, at);
         }
         (*code).entry = (&raw const *stub).cast();
-        let code = Value::from_object(code.cast()).bits();
         compiled.installed[number as usize] =
-            Some(InstalledCode { stub, loops: unused(&made), made, code, has_guesses, wrong: 0 });
+            Some(InstalledCode { stub, loops: unused(&made), made, order, wrong: 0 });
         rouse_loops(compiled);
+    }
+}
+
+/// Lets calls and loops of a code lead to the interpreter again, and gives its machine code back.
+///
+/// # Safety
+/// `code` is a live Code, and no machine code runs.
+pub(super) unsafe fn uninstall(compiled: &mut CompiledFunctions, code: *mut CodeObject) {
+    // SAFETY: by the contract; nobody holds a reference to the words of a code.
+    unsafe {
+        if *(*code).entry != u32::from(stubs::NATIVE_ENTRY) {
+            return;
+        }
+        let number = (*(*code).entry.cast::<EntryStub>()).number;
+        let Some(installed) = compiled.installed.get_mut(number as usize).and_then(Option::take) else {
+            return;
+        };
+        (*code).entry =
+            if compiled.tier == Tier::Native { &raw const MAKE_AT_ENTRY } else { first_instruction(code) };
+        for &at in installed.made.loops() {
+            calm_loop(first_instruction(code).add(at));
+        }
+        compiled.report.bytes -= installed.made.bytes().next_multiple_of(4096);
+        compiled.free.push(number);
+        compiled.heat.forget(code.addr() as u64);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Machine code beside the loop: entering it, what it asks of the machine, and making it.
 //!
-//! The contract is that of `esl_native` (N1 to N7). Machine code is entered where the loop meets the stub
+//! The contract is that of `esl_native` (N1 to N8). Machine code is entered where the loop meets the stub
 //! that the entry word of compiled code leads to, or a loop instruction that was quickened. When it is left,
 //! the loop goes on with the instruction at which it was left, as if it had run all before.
 //!
@@ -18,7 +18,7 @@ use std::mem::MaybeUninit;
 use esl_bytecode::opcode::Opcode;
 use esl_native::abi::{EntryStub, NativeEntry, TAIL};
 use esl_native::{
-    AGAIN, GUESSED_WRONG, IN_PLACE, Known, NativeContext, NativeReply, RETURN_VALUES, RETURNED,
+    AGAIN, GUESSED_WRONG, IN_PLACE, Known, NativeContext, NativeReply, REDEFINED, RETURN_VALUES, RETURNED,
 };
 
 use super::{Signal, aux_at, code_of, constant, first_instruction, stubs, word_at};
@@ -26,12 +26,12 @@ use crate::fused::quicken_loop;
 use crate::heap::layout::{CodeObject, Kind, SymbolObject};
 use crate::heap::{Heap, Phase};
 use crate::shape::Shape;
-use crate::tier::{CompiledFunctions, InstalledCode, LoopUse, Tier};
+use crate::tier::{CompiledFunctions, LoopUse, Tier};
 use crate::value::Value;
 use crate::vm::Vm;
 
 pub(super) use make::make_at_entry;
-use make::{install_made, instructions, make};
+use make::{install_made, instructions, make, uninstall};
 
 /// Words of the stack that one entry may use, which bounds the native stack too: about 500 KB.
 const WORDS_AT_ONCE: usize = 4096;
@@ -162,7 +162,7 @@ fn rouse_loops(compiled: &mut CompiledFunctions) {
             // SAFETY: the word was made of the address of a code, which is there: else this had been given
             // back when all that is reached had been marked. Nobody holds a reference to its words.
             unsafe {
-                let code = Value::from_bits(installed.code).object_ptr().cast::<CodeObject>();
+                let code = Value::from_bits(installed.order.code).object_ptr().cast::<CodeObject>();
                 let words = instructions(code).len();
                 let words = std::slice::from_raw_parts_mut(first_instruction(code).cast_mut(), words);
                 quicken_loop(words, at);
@@ -186,6 +186,7 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         limit: limit.expose_provenance() as u64,
         pc: 0,
         base: 0,
+        outer: 0,
         value: 0,
         put_aside: [0; 4],
         doubles: [MaybeUninit::uninit(); 256],
@@ -215,13 +216,12 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         }
         reply
     };
-    if matches!(reply.status, AGAIN | GUESSED_WRONG) {
-        let base = std::ptr::with_exposed_provenance_mut(context.base as usize);
+    if matches!(reply.status, AGAIN | GUESSED_WRONG | REDEFINED) {
         // SAFETY: N3, N4: it was left in that frame.
         unsafe {
-            make_words(&mut context, base);
+            make_words(&mut context);
             debug_assert!(
-                reply.status == GUESSED_WRONG || is_as_said(vm, context.pc, base),
+                reply.status == GUESSED_WRONG || is_as_said(vm, &context),
                 "left at what it was not made for"
             );
         }
@@ -232,13 +232,17 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
     }
     if reply.status == GUESSED_WRONG {
         // SAFETY: N4: it was left in that frame, whose function has machine code.
-        unsafe { note_wrong_guess(vm, context.base) };
+        unsafe { note_wrong_guess(vm, context.outer) };
+    }
+    if reply.status == REDEFINED {
+        // SAFETY: N8: it was left at a call in that frame, and no machine code runs any more.
+        unsafe { note_redefined(vm, &context) };
     }
     let left = match reply.status {
         // SAFETY: N3: a value of the program.
         RETURNED => Left::Returned(unsafe { Value::from_bits(reply.value) }),
         RETURN_VALUES => Left::Values,
-        AGAIN | GUESSED_WRONG => Left::Again,
+        AGAIN | GUESSED_WRONG | REDEFINED => Left::Again,
         _ => Left::Signal(caller.signal),
     };
     Leaving {
@@ -249,39 +253,42 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
     }
 }
 
-/// Returns whether the registers of the frame in which machine code was left are what its maker says of them
-/// there.
+/// Returns whether the registers of the frame in which machine code was left, and of those around it that it
+/// made, are what its maker says of them there.
 ///
 /// # Safety
-/// `base` is the frame in which it was left, and `pc` the address of an instruction of its function.
-unsafe fn is_as_said(vm: &Vm, pc: u64, base: *mut Value) -> bool {
+/// Machine code was left as the context says.
+unsafe fn is_as_said(vm: &Vm, context: &NativeContext) -> bool {
+    let base: *mut Value = std::ptr::with_exposed_provenance_mut(context.base as usize);
+    let outer: *mut Value = std::ptr::with_exposed_provenance_mut(context.outer as usize);
     // SAFETY: F2: the function of the frame keeps its code alive; an entry leads to an operation of the loop.
+    // The frames have room up to the end of the topmost one.
     unsafe {
-        let code = code_of(*base.sub(2));
+        let code = code_of(*outer.sub(2));
         if *(*code).entry != u32::from(stubs::NATIVE_ENTRY) {
             return false;
         }
         let number = (*(*code).entry.cast::<EntryStub>()).number as usize;
-        let registers = std::slice::from_raw_parts(base, (*code).nregs as usize);
-        let first = first_instruction(code).addr() as u64;
-        let at = pc.checked_sub(first).map(|bytes| bytes as usize / size_of::<u32>());
+        let below = base.offset_from_unsigned(outer);
+        let registers = std::slice::from_raw_parts(outer, below + (*code_of(*base.sub(2))).nregs as usize);
         let installed = vm.compiled.installed.get(number).and_then(Option::as_ref);
-        installed.zip(at).is_some_and(|(installed, at)| installed.made.may_be_left(at, registers))
+        installed.is_some_and(|installed| installed.made.may_be_left(context.pc, below, registers))
     }
 }
 
 /// Writes the words of the doubles that machine code has put aside.
 ///
 /// # Safety
-/// `base` is the frame in which machine code was left, or has called the machine.
+/// Machine code was left, or has called the machine.
 #[inline]
-unsafe fn make_words(context: &mut NativeContext, base: *mut Value) {
+unsafe fn make_words(context: &mut NativeContext) {
+    let base: *mut Value = std::ptr::with_exposed_provenance_mut(context.outer as usize);
     for (index, names) in context.put_aside.iter_mut().enumerate() {
         while *names != 0 {
             let register = index * 64 + names.trailing_zeros() as usize;
             *names &= *names - 1;
             // SAFETY: N3: machine code has written the bits of what it names, and the place is one of the
-            // frame.
+            // frame, or of those that it has made above it.
             unsafe {
                 let bits = context.doubles[register].assume_init();
                 if bits == IN_PLACE {
@@ -352,9 +359,28 @@ unsafe fn note_wrong_guess(vm: &mut Vm, base: u64) {
         let number = (*(*code).entry.cast::<EntryStub>()).number as usize;
         let Some(installed) = vm.compiled.installed.get_mut(number).and_then(Option::as_mut) else { return };
         installed.wrong += 1;
-        if installed.wrong == WRONG_GUESSES && installed.has_guesses {
+        if installed.wrong == WRONG_GUESSES && installed.order.has_guesses {
             make(vm, code, Vec::new());
         }
+    }
+}
+
+/// Gives machine code back in which a function was inlined that its symbol no longer has. What is made anew
+/// calls it.
+///
+/// # Safety
+/// Machine code was left with [`REDEFINED`], as the context says.
+#[cold]
+#[inline(never)]
+unsafe fn note_redefined(vm: &mut Vm, context: &NativeContext) {
+    let pc: *const u32 = std::ptr::with_exposed_provenance(context.pc as usize);
+    let base: *mut Value = std::ptr::with_exposed_provenance_mut(context.base as usize);
+    let outer: *mut Value = std::ptr::with_exposed_provenance_mut(context.outer as usize);
+    // SAFETY: N8: the instruction is the call of a global function in that frame. F2: the function of the
+    // frame of the machine code keeps its code alive.
+    unsafe {
+        vm.compiled.redefined.insert(constant(base, aux_at(pc) as usize).bits());
+        uninstall(&mut vm.compiled, code_of(*outer.sub(2)));
     }
 }
 
@@ -401,17 +427,21 @@ impl Vm {
     /// is marked, and no machine code runs.
     pub(super) fn give_back_code(compiled: &mut CompiledFunctions, heap: &Heap) {
         compiled.heat.clear();
-        // SAFETY: the word was made of the address of a code; whether it is marked is told by its address.
-        compiled.asked.retain(|_, (code, _)| heap.is_marked(unsafe { Value::from_bits(*code) }));
-        for installed in &mut compiled.installed {
-            let Some(InstalledCode { made, code, stub, .. }) = installed else { continue };
-            // SAFETY: the word was made of the address of the code; whether it is marked is told by its
-            // address.
-            if !heap.is_marked(unsafe { Value::from_bits(*code) }) {
-                debug_assert_eq!(stub.word, u32::from(stubs::NATIVE_ENTRY));
-                compiled.report.bytes -= made.bytes().next_multiple_of(4096);
-                compiled.free.push(stub.number);
-                *installed = None;
+        // SAFETY: a word was made of the address of an object; whether that is marked is told by its address.
+        let is_there = |word: u64| heap.is_marked(unsafe { Value::from_bits(word) });
+        let are_there = |words: &[u64]| words.iter().all(|&word| is_there(word));
+        compiled.asked.retain(|_, order| is_there(order.code) && are_there(&order.inlined));
+        compiled.redefined.retain(|&symbol| is_there(symbol));
+        for number in 0..compiled.installed.len() {
+            let Some(installed) = &compiled.installed[number] else { continue };
+            let (code, stands) = (installed.order.code, are_there(&installed.order.inlined));
+            if !is_there(code) {
+                compiled.report.bytes -= installed.made.bytes().next_multiple_of(4096);
+                compiled.free.push(number as u32);
+                compiled.installed[number] = None;
+            } else if !stands {
+                // SAFETY: the code is marked, so it is there.
+                unsafe { uninstall(compiled, Value::from_bits(code).object_ptr().cast()) };
             }
         }
     }

@@ -81,7 +81,7 @@ pub(super) unsafe extern "C" fn step(context: *mut NativeContext, pc: *const u32
     // SAFETY: machine code calls this at an instruction of the frame at `base`.
     unsafe {
         let base = base.cast::<Value>();
-        make_words(&mut *context, base);
+        make_words(&mut *context);
         let (vm, _) = parts(context);
         match instruction(vm, pc, base) {
             Done::Fast => STEP_NEXT,
