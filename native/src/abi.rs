@@ -77,7 +77,7 @@ pub struct NativeContext {
     /// Where it was left: base of the frame of the function whose machine code it is, which is another one if
     /// it was left in an inlined function.
     pub outer: u64,
-    /// Value that a builtin called in place of the function has returned.
+    /// Value that a builtin called in place of the function has returned, or that `only_value` delivers.
     pub value: u64,
     /// Registers, from `outer` on, whose doubles are put aside: see N3. None while machine code runs.
     pub put_aside: [u64; 4],
@@ -91,8 +91,15 @@ pub struct NativeContext {
     pub call_builtin: NativeHelper,
     /// Calls the builtin of a `tail-call-builtin`.
     pub tail_builtin: NativeHelper,
-    /// Puts the first value of the value list into the window of a call, as what the call returns.
-    pub first_value: NativeHelper,
+    /// Puts the arguments of a call in the order of the callee's parameters, some of which are not required,
+    /// and returns the address of its machine code; 0, without effect, if that is not done so simply.
+    pub arrange: NativeHelper,
+    /// As `arrange`, for a tail call: the arguments get into the running frame.
+    pub arrange_in_place: NativeHelper,
+    /// Delivers the value list as what the function in the frame `base` returns.
+    pub all_values: NativeHelper,
+    /// Delivers `value` as the only one that the function in the frame `base` returns, where more are wanted.
+    pub only_value: NativeHelper,
     /// Overwrites a slot while objects are marked.
     pub store: NativeStore,
     /// Reads a special variable that was bound.

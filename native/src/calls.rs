@@ -31,13 +31,6 @@ pub(crate) fn lookup_of(builtin: u32, count: u8) -> Option<usize> {
     }
 }
 
-/// A callee that has machine code and takes exactly the given arguments.
-struct NativeCallee {
-    function: Ssa,
-    address: Ssa,
-    registers: Ssa,
-}
-
 impl Translator<'_, '_> {
     /// Takes a tick, or leaves at this instruction if there is none.
     pub(crate) fn tick(&mut self) {
@@ -62,26 +55,37 @@ impl Translator<'_, '_> {
         self.load(base, place)
     }
 
-    /// Returns where a register of the running frame is, from the base of the frame of the function itself on.
+    /// Returns where a register of the running frame is, from the frame of the function itself on.
     fn place(&self, register: u8) -> i32 {
         (i32::from(self.frame.base) + i32::from(register)) * WORD
     }
 
-    /// Leaves at this instruction unless `function`, a Function, has machine code and takes `count`
-    /// arguments.
-    fn callee(&mut self, function: Ssa, count: u8) -> NativeCallee {
+    /// Goes on only if `function`, a Function, takes exactly `count` arguments; leaves at this instruction
+    /// unless it has machine code, of which the address is returned, and room from `base` on.
+    fn callee(&mut self, function: Ssa, count: u8, base: Ssa, otherwise: Block) -> Ssa {
         let exit = self.exit();
         let code = self.load(function, in_object(offset_of!(FunctionObject, code)));
         let arity = self.load_u32(code, in_object(offset_of!(CodeObject, arity)));
         let takes_them = self.equals(arity, u64::from(count));
-        self.require(takes_them, exit);
+        self.require(takes_them, otherwise);
         let entry = self.load(code, in_object(offset_of!(CodeObject, entry)));
         let word = self.load_u32(entry, offset_of!(EntryStub, word) as i32);
         let is_native = self.equals(word, u64::from(self.source.entry_word));
         self.require(is_native, exit);
         let address = self.load(entry, offset_of!(EntryStub, address) as i32);
         let registers = self.load_u32(code, in_object(offset_of!(CodeObject, nregs)));
-        NativeCallee { function, address, registers }
+        self.require_room(base, registers);
+        address
+    }
+
+    /// Has the machine put arguments in the order of the parameters of a function that takes other numbers of
+    /// arguments too; leaves at this instruction if that is not done. Returns the address of the machine
+    /// code.
+    fn arranged(&mut self, helper: usize) -> Ssa {
+        let exit = self.exit();
+        let address = self.call_helper(helper);
+        self.require(address, exit);
+        address
     }
 
     /// Leaves at this instruction unless there is room for so many registers from `base` on.
@@ -100,65 +104,92 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn call_global(&mut self, window: u8, count: u8, want: Want, symbol: u32, next: usize) {
-        if want != Want::ONE {
-            return self.leave();
-        }
         self.put_back_for_call(window);
         let function = self.global(symbol);
-        let callee = self.callee(function, count);
-        self.call(window, callee, None, next);
+        self.call((window, count, want), function, next);
     }
 
     pub(crate) fn call_given(&mut self, window: u8, count: u8, want: Want, next: usize) {
-        if want != Want::ONE {
-            return self.leave();
-        }
         self.put_back_for_call(window);
         let (function, exit) = (self.get(window), self.exit());
         self.require_kind(function, Kind::Function, exit);
-        let callee = self.callee(function, count);
-        self.call(window, callee, None, next);
+        self.call((window, count, want), function, next);
     }
 
     pub(crate) fn call_self(&mut self, window: u8, want: Want, next: usize) {
-        if want != Want::ONE {
-            return self.leave();
-        }
         self.put_back_for_call(window);
-        let function = self.running();
+        let (function, frame) = (self.running(), self.frame_in(window));
+        let registers = self.word(self.source.function.registers as u64);
+        self.require_room(frame, registers);
+        self.tick();
+        self.link(window, function, next);
         let (itself, pointer) = (self.itself, self.pointer);
         let address = self.b.ins().func_addr(pointer, itself);
-        let registers = self.word(self.source.function.registers as u64);
-        self.call(window, NativeCallee { function, address, registers }, Some(()), next);
+        let value = self.invoke(window, frame, address, Some(()), want);
+        self.note_values(window, value, want);
     }
 
-    /// Makes the frame of a callee in the window, and calls it.
-    fn call(&mut self, window: u8, callee: NativeCallee, itself: Option<()>, next: usize) {
-        let (base, place) = (self.base, i32::from(window) * WORD);
-        let frame = self.b.ins().iadd_imm_s(base, i64::from(place + 2 * WORD));
-        self.require_room(frame, callee.registers);
+    /// Makes the frame of a function in the window, and calls it.
+    fn call(&mut self, (window, count, want): (u8, u8, Want), function: Ssa, next: usize) {
+        let (frame, others, (ready, address)) =
+            (self.frame_in(window), self.cold_block(), self.block_with_value());
+        let of_exact = self.callee(function, count, frame, others);
+        self.jump_with(ready, of_exact);
+        self.go_to(others);
+        let of_others = self.arranged(offset_of!(NativeContext, arrange));
+        self.jump_with(ready, of_others);
+        self.go_to(ready);
         self.tick();
-        self.store(callee.function, base, place);
-        let return_to = self.pc(next);
+        self.link(window, function, next);
+        let value = self.invoke(window, frame, address, None, want);
+        self.note_values(window, value, want);
+    }
+
+    /// Notes what a call has returned, of which `value` is the first.
+    fn note_values(&mut self, window: u8, value: Ssa, want: Want) {
+        if want == Want::ONE {
+            return self.set(window, value, Known::Nothing);
+        }
+        self.reload(window, want.registers());
+    }
+
+    /// Returns the base of the frame of a call with this window.
+    fn frame_in(&mut self, window: u8) -> Ssa {
+        let base = self.base;
+        self.b.ins().iadd_imm_s(base, i64::from(window) * i64::from(WORD) + 2 * i64::from(WORD))
+    }
+
+    /// Writes the link of a frame.
+    pub(crate) fn link(&mut self, window: u8, function: Ssa, next: usize) {
+        let (base, place, return_to) = (self.base, i32::from(window) * WORD, self.pc(next));
+        self.store(function, base, place);
         self.store(return_to, base, place + WORD);
-        self.kept_back = RegisterBits::NONE;
-        let value = self.invoke(window, frame, callee.address, itself);
-        self.set(window, value, Known::Nothing);
+        let mut link = RegisterBits::NONE;
+        link.insert_range(usize::from(window), 2);
+        self.kept_back = self.kept_back.without(link);
     }
 
     /// Calls machine code in a frame that has been made, and returns its value. What else it may say than
-    /// that it has returned is dealt with; more values than one are delivered to the window.
-    pub(crate) fn invoke(&mut self, window: u8, frame: Ssa, given: Ssa, itself: Option<()>) -> Ssa {
+    /// that it has returned is dealt with; other numbers of values than one are delivered to the window.
+    pub(crate) fn invoke(
+        &mut self,
+        window: u8,
+        frame: Ssa,
+        given: Ssa,
+        itself: Option<()>,
+        want: Want,
+    ) -> Ssa {
         let (context, base, first) = (self.context, self.base, self.word(0));
         let (again, address) = self.block_with_value();
         let (done, value) = self.block_with_value();
+        let (returned, only) = self.block_with_value();
         let other = self.cold_block();
         let status_of_other = self.b.append_block_param(other, types::I64);
         let value_of_other = self.b.append_block_param(other, types::I64);
         let results = |this: &mut Self, call| {
             let results = this.b.inst_results(call);
             let (status, value) = (results[0], results[1]);
-            this.b.ins().brif(status, other, &[status.into(), value.into()], done, &[value.into()]);
+            this.b.ins().brif(status, other, &[status.into(), value.into()], returned, &[value.into()]);
         };
         if itself.is_some() {
             let call = self.b.ins().call(self.itself, &[context, frame, first]);
@@ -171,6 +202,17 @@ impl Translator<'_, '_> {
         let call = self.b.ins().call_indirect(self.entry_signature, address, &[context, frame, first]);
         results(self, call);
 
+        self.go_to(returned);
+        if want == Want::ONE {
+            self.jump_with(done, only);
+        } else {
+            self.store_context(only, offset_of!(NativeContext, value));
+            self.store_context(frame, offset_of!(NativeContext, base));
+            self.call_helper(offset_of!(NativeContext, only_value));
+            let first = self.load(base, i32::from(window) * WORD);
+            self.jump_with(done, first);
+        }
+
         self.go_to(other);
         let (further, values, leave) = (self.cold_block(), self.cold_block(), self.cold_block());
         let is_tail = self.equals(status_of_other, TAIL);
@@ -181,7 +223,7 @@ impl Translator<'_, '_> {
         self.go_to(leave);
         self.b.ins().return_(&[status_of_other, value_of_other]);
         self.go_to(values);
-        self.call_helper(offset_of!(NativeContext, first_value));
+        self.call_helper(offset_of!(NativeContext, all_values));
         let first = self.load(base, i32::from(window) * WORD);
         self.jump_with(done, first);
         self.go_to(done);
@@ -207,16 +249,22 @@ impl Translator<'_, '_> {
 
     /// Puts the frame of a callee in place of the running one, and returns the address of its machine code.
     pub(crate) fn replace_frame(&mut self, window: u8, count: u8, function: Ssa) -> Ssa {
-        let (outer, base) = (self.base, self.base_at(self.at));
-        let callee = self.callee(function, count);
-        self.require_room(base, callee.registers);
+        let (outer, base, others) = (self.base, self.base_at(self.at), self.cold_block());
+        let (ready, address) = self.block_with_value();
+        let of_exact = self.callee(function, count, base, others);
         self.tick();
         let arguments: Vec<Ssa> = (0..count).map(|i| self.get(window + 2 + i)).collect();
         for (i, argument) in arguments.into_iter().enumerate() {
             self.store(argument, outer, self.place(i as u8));
         }
+        self.jump_with(ready, of_exact);
+        self.go_to(others);
+        let of_others = self.arranged(offset_of!(NativeContext, arrange_in_place));
+        self.tick();
+        self.jump_with(ready, of_others);
+        self.go_to(ready);
         self.store(function, outer, self.place(0) + FUNCTION);
-        callee.address
+        address
     }
 
     /// The square root of a double.

@@ -197,7 +197,10 @@ impl<'a> NativeFlow<'a> {
         let Instr::CallGlobal { window, count, want: Want::ONE, symbol } = *instr else { return None };
         let caller = &self.frames[frame];
         let symbol = *caller.source.constants.get(symbol.0 as usize)?;
-        let callee = inlined.iter().find(|callee| callee.symbol == symbol && callee.arity == count.0)?;
+        let takes_them = |callee: &&InlinedSource| {
+            callee.required <= count.0 && count.0 - callee.required <= callee.optional
+        };
+        let callee = inlined.iter().find(|callee| callee.symbol == symbol).filter(takes_them)?;
         let source = &callee.function;
         let base = usize::from(caller.base) + usize::from(window.0) + 2;
         let words = self.steps.len() - self.frames[0].source.words.len();

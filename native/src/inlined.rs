@@ -8,6 +8,8 @@ use std::mem::offset_of;
 
 use cranelift_codegen::ir::{InstBuilder, Value as Ssa};
 use esl_bytecode::opcode::Instr;
+use esl_bytecode::operand::Want;
+use esl_heap::Value;
 use esl_heap::heap::Kind;
 
 use crate::abi::{NativeContext, REDEFINED};
@@ -37,9 +39,11 @@ impl Translator<'_, '_> {
         above.remove_range(usize::from(window), 2);
         self.clear_places(above);
         self.forget(dropped);
-        let (base, place, return_to) = (self.base, i32::from(window) * WORD, self.pc(step.next));
-        self.store(function, base, place);
-        self.store(return_to, base, place + WORD);
+        self.link(window, function, step.next);
+        for missing in count..inlined.required + inlined.optional {
+            let unsupplied = self.constant_value(Value::UNSUPPLIED);
+            self.set(window + 2 + missing, unsupplied, Known::Nothing);
+        }
         let target = self.target(step);
         self.jump(target);
         self.ended();
@@ -55,7 +59,7 @@ impl Translator<'_, '_> {
                 let first = self.load_context(offset_of!(NativeContext, value));
                 self.jump_with(done, first);
                 self.go_to(more);
-                self.deliver_first();
+                self.deliver_values();
                 let base = self.base;
                 let first = self.load(base, i32::from(to) * WORD);
                 self.jump_with(done, first);
@@ -93,7 +97,7 @@ impl Translator<'_, '_> {
                         self.step();
                     }
                     self.put_back();
-                    self.deliver_first();
+                    self.deliver_values();
                     self.forget(above);
                     self.reload(to, 1);
                     self.check_guess(to);
@@ -109,16 +113,16 @@ impl Translator<'_, '_> {
     fn call_in_place(&mut self, window: u8, count: u8, function: Ssa, to: u8) {
         let address = self.replace_frame(window, count, function);
         let frame = self.base_at(self.at);
-        let value = self.invoke(to, frame, address, None);
+        let value = self.invoke(to, frame, address, None, Want::ONE);
         self.forget(RegisterBits::all_from(to));
         self.set(to, value, Known::Nothing);
     }
 
     /// Has the machine return the value list from the running frame, which delivers the first one.
-    fn deliver_first(&mut self) {
+    fn deliver_values(&mut self) {
         let base = self.base_at(self.at);
         self.store_context(base, offset_of!(NativeContext, base));
-        self.call_helper(offset_of!(NativeContext, first_value));
+        self.call_helper(offset_of!(NativeContext, all_values));
     }
 
     /// Forgets what registers hold whose frame begins or ends.

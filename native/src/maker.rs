@@ -41,8 +41,10 @@ pub struct InlinedSource {
     pub symbol: Value,
     /// The function of the symbol.
     pub callee: Value,
-    /// Number of its parameters, all of them required.
-    pub arity: u8,
+    /// Number of its required parameters.
+    pub required: u8,
+    /// Number of its optional parameters. It has no others.
+    pub optional: u8,
     /// Its code, for which [`may_be_inlined`](crate::may_be_inlined) holds.
     pub function: FunctionSource,
 }

@@ -23,6 +23,33 @@ pub(crate) enum ElementIndex {
 }
 
 impl Translator<'_, '_> {
+    /// Returns the address of the element of a simple vector that a fixnum names, less [`ELEMENTS`] and the
+    /// tag; goes to `otherwise` if there is none.
+    pub(crate) fn element(&mut self, vector: Ssa, index: (Ssa, Known), otherwise: Block) -> Ssa {
+        self.require_kind(vector, Kind::SimpleVector, otherwise);
+        let at = self.index(vector, index, otherwise);
+        let offset = self.b.ins().ishl_imm_s(at, 3);
+        self.b.ins().iadd(vector, offset)
+    }
+
+    /// Returns the number that a fixnum is, if it is below the length of an object.
+    pub(crate) fn index(&mut self, object: Ssa, index: (Ssa, Known), otherwise: Block) -> Ssa {
+        let length = self.length(object);
+        self.index_below(length, index, otherwise)
+    }
+
+    /// Returns the number that a fixnum is, if it is below a length.
+    pub(crate) fn index_below(&mut self, length: Ssa, index: (Ssa, Known), otherwise: Block) -> Ssa {
+        if index.1 != Known::Fixnum {
+            let tag = self.b.ins().band_imm_s(index.0, 3);
+            self.refuse(tag, otherwise);
+        }
+        let at = self.b.ins().ushr_imm_s(index.0, 2);
+        let is_below = self.b.ins().icmp(IntCC::UnsignedLessThan, at, length);
+        self.require(is_below, otherwise);
+        at
+    }
+
     /// Follows halves of pairs.
     pub(crate) fn follow(&mut self, dst: u8, list: u8, halves: &[usize]) {
         let (mut value, slow) = (self.get(list), self.cold_block());

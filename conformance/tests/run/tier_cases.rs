@@ -27,7 +27,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 ";
 
 /// Name and text of each.
-const CASES: [(&str, &str); 13] = [
+const CASES: [(&str, &str); 15] = [
     (
         "functions redefined while they run",
         "(defun step-of (x) (+ x 1))
@@ -76,6 +76,69 @@ const CASES: [(&str, &str); 13] = [
                (when (< 1.0e200 sum) (setq sum 1.0)))
              (list sum seen)))
          (print (run 3)) (print (run 200)) (print (multiple-value-list (both 1)))",
+    ),
+    (
+        "calls with arguments that are put in order",
+        "(defun opt (a &optional (b 0.5) c) (list a b c))
+         (defun rest-of (a &rest others) (if others (list a others) a))
+         (defun keys (a &key (b (* a 0.5)) ((:d c) 7 c-p) &allow-other-keys) (list a b c c-p))
+         (defun strict (&key x) x)
+         (defun tail-opt (a) (opt a))
+         (defun tail-rest (a b c) (rest-of a b c))
+         (defun tail-keys (a b) (keys (* a 1.5) :d b :d 9))
+         (defun given (f x) (funcall f x x))
+         (defun deep (n &optional (x 0.5)) (if (= n 0) x (+ 0.25 (deep (- n 1) (* x 1.0)))))
+         (defun run (n)
+           (let ((sum 0.0) (seen nil))
+             (dotimes (i n)
+               (setq sum (+ (* sum 0.5) (second (opt i)) (rest-of (* sum 0.25))))
+               (setq seen (list (opt i sum) (opt i sum nil) (rest-of i sum seen) (keys sum) (keys i :b sum)
+                                (keys i :e 3 :d sum) (tail-opt sum) (tail-rest i sum i) (tail-keys sum i)
+                                (given #'opt sum) (given #'rest-of i) (strict) (strict :x sum)))
+               (setq seen (list i (equal seen (copy-tree seen)) (nth (mod i 13) seen)))
+               (when (= 0 (mod i 40))
+                 (setq seen (list (handler-case (opt) (error (e) (type-of e)))
+                                  (handler-case (opt 1 2 3 4) (error (e) (type-of e)))
+                                  (handler-case (strict :y sum) (error (e) (type-of e)))
+                                  (handler-case (strict :x) (error (e) (type-of e)))
+                                  (apply #'rest-of (make-list 30 :initial-element sum))))))
+             (list sum seen)))
+         (dotimes (i 45) (print (run i))) (print (run 300)) (print (deep 3000))
+         (defun many (&rest all) (length all))
+         (defun long (n) (let ((sum 0)) (dotimes (i n) (incf sum (many i i i i i i i i i i i i i i i i i i i i)))
+                              sum))
+         (print (long 100))",
+    ),
+    (
+        "calls that want other numbers of values than one",
+        "(defun one (x) (* x 0.5))
+         (defun none () (values))
+         (defun three (x) (values x (* x 2.0) (list x)))
+         (defun floored (x) (floor x 0.75))
+         (defun pass-on (x) (three (one x)))
+         (defun through (n x) (if (= n 0) (three x) (through (- n 1) (* x 1.0))))
+         (defun protected (f x) (unwind-protect (funcall f x) (one x)))
+         (defvar *level* 0)
+         (defun bound (x) (let ((*level* (+ *level* 1))) (three x)))
+         (defun self (n) (if (= n 0) (values 1 2) (multiple-value-bind (a b) (self (- n 1)) (values b (+ a n)))))
+         (defun run (n)
+           (let ((sum 0.0) (seen nil))
+             (dotimes (i n)
+               (multiple-value-bind (a b c d) (three sum)
+                 (multiple-value-bind (q r) (floored (+ a i))
+                   (setq sum (+ (* sum 0.25) b (car c) q r) seen d)))
+               (setq seen (list (multiple-value-list (one sum)) (multiple-value-list (none))
+                                (multiple-value-list (pass-on i)) (multiple-value-list (through 5 sum))
+                                (multiple-value-list (protected #'three sum))
+                                (multiple-value-list (protected #'one i)) (multiple-value-list (bound sum))
+                                (multiple-value-list (self (mod i 7))) (multiple-value-list (protected #'floor i))
+                                (multiple-value-call #'list (one sum) (three i) (none) (one 2))
+                                (multiple-value-bind (a b) (none) (list a b))
+                                (multiple-value-bind (a b c) (one sum) (list a b c))
+                                (multiple-value-prog1 (one sum) (three sum)) *level*))
+               (when (> sum 1.0e100) (setq sum 0.5)))
+             (list sum seen)))
+         (dotimes (i 40) (print (run i))) (print (run 400))",
     ),
     (
         "small functions of which one fails, sleeps, or is collected",

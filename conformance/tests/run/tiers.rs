@@ -201,7 +201,11 @@ impl RandomNumbers {
     fn program(mut self) -> String {
         let mut text = String::from(
             "(defun tame (v) (if (< -1000000000000000000000 v 1000000000000000000000) v 7))\n\
-             (defun f0 (a b) (+ (* a 2) b))\n",
+             (defun f0 (a b) (+ (* a 2) b))\n\
+             (defun o0 (a &optional (b 2.5)) (- b a))\n\
+             (defun o1 (a &rest others) (if others (+ a (car others)) (* a 0.5)))\n\
+             (defun o2 (&key (by 3) of) (if of (* by of) (o0 by)))\n\
+             (defun o3 (a &optional b) (if b (o1 b a 1) (o2 :by a)))\n",
         );
         for number in 0..SMALL {
             let _ = writeln!(text, "(defun g{number} (a b) {})", self.small(number));
@@ -271,7 +275,7 @@ impl RandomNumbers {
             };
         }
         let (x, y) = (self.expression(depth - 1), self.expression(depth - 1));
-        match self.below(16) {
+        match self.below(18) {
             0 | 1 => format!("(+ {x} {y})"),
             2 => format!("(- {x} {y})"),
             3 => format!("(* {x} {y})"),
@@ -283,6 +287,15 @@ impl RandomNumbers {
             9 => format!("(svref (vector {x} {y}) 1)"),
             10 => format!("(logand (floor {x}) 255)"),
             11 => format!("(f0 {x} {y})"),
+            12 => format!("(o0 {x})"),
+            13 => match self.below(6) {
+                0 => format!("(o1 {x} {y} 3)"),
+                1 => format!("(o1 {x})"),
+                2 => format!("(o2 :of {x} :by {y})"),
+                3 => format!("(o3 {x} {y})"),
+                4 => format!("(o3 {x})"),
+                _ => format!("(o0 {x} {y})"),
+            },
             _ => format!("(g{} {x} {y})", self.below(SMALL)),
         }
     }

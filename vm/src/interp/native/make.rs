@@ -176,7 +176,7 @@ unsafe fn inlined_by(
     let mut at = 0;
     while let Some(instr) = Instr::decode(&caller.words, at) {
         at += instr.opcode().words();
-        let Instr::CallGlobal { count, want: Want::ONE, symbol, .. } = instr else { continue };
+        let Instr::CallGlobal { want: Want::ONE, symbol, .. } = instr else { continue };
         let Some(&symbol) = caller.constants.get(symbol.0 as usize) else { continue };
         if inlined.len() == MAX_CALLEES
             || compiled.redefined.contains(&symbol.bits())
@@ -191,7 +191,11 @@ unsafe fn inlined_by(
                 continue;
             }
             let code = code_of(callee);
-            if (*code).arity != u32::from(count.0) || !Shape::is_bytecode((*code).spare[0]) {
+            if !Shape::is_bytecode((*code).spare[0]) {
+                continue;
+            }
+            let Shape { required, optional, rest, takes_keys, .. } = Shape::unpack((*code).spare[0]);
+            if rest || takes_keys {
                 continue;
             }
             if instructions(code).len() > MAX_INLINED {
@@ -200,7 +204,7 @@ unsafe fn inlined_by(
             let function = function_source(code);
             if function.words_at != caller.words_at && may_be_inlined(&function.words) {
                 callees.push(function.clone());
-                inlined.push(InlinedSource { symbol, callee, arity: count.0, function });
+                inlined.push(InlinedSource { symbol, callee, required, optional, function });
             }
         }
     }

@@ -8,6 +8,7 @@
 //! [`MAKE_AT_ENTRY`]. So nobody but the arms of the loop that make frames goes by it; a task that stands at
 //! the beginning of a function stands at the first instruction.
 
+mod call;
 mod make;
 mod step;
 mod table;
@@ -194,7 +195,10 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         step: step::step,
         call_builtin: step::call_builtin,
         tail_builtin: step::tail_builtin,
-        first_value: step::first_value,
+        arrange: call::arrange,
+        arrange_in_place: call::arrange_in_place,
+        all_values: step::all_values,
+        only_value: step::only_value,
         store: step::store,
         value_of: step::value_of,
         set_value_of: step::set_value_of,
@@ -329,11 +333,13 @@ unsafe fn note_call(vm: &mut Vm, pc: u64, base: u64) {
             return;
         }
         let code = code_of(function);
-        if (*code).arity != word.b() as u32 || !Shape::is_bytecode((*code).spare[0]) {
+        if !Shape::is_bytecode((*code).spare[0]) {
             return;
         }
         if vm.compiled.heat.count(code.addr() as u64) == HOT_CALLS {
-            let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), word.b());
+            // Where others than these are taken too, the registers get them in another order.
+            let count = if (*code).arity == word.b() as u32 { word.b() } else { 0 };
+            let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), count);
             let mut guesses: Vec<_> = arguments.iter().map(|&value| Known::of(value)).collect();
             // Some, even if it is of nothing: doubles are told from other values.
             guesses.push(Known::Nothing);

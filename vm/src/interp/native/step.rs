@@ -153,7 +153,7 @@ pub(super) unsafe extern "C" fn tail_builtin(
 }
 
 /// Delivers the value list as what the function in the frame that was left returns.
-pub(super) unsafe extern "C" fn first_value(
+pub(super) unsafe extern "C" fn all_values(
     context: *mut NativeContext,
     _pc: *const u32,
     _base: *mut u64,
@@ -165,6 +165,21 @@ pub(super) unsafe extern "C" fn first_value(
         substitute::return_all(vm);
     }
     STEP_NEXT
+}
+
+/// Delivers a value as the only one that the function in the frame that was left returns.
+pub(super) unsafe extern "C" fn only_value(
+    context: *mut NativeContext,
+    pc: *const u32,
+    base: *mut u64,
+) -> u64 {
+    // SAFETY: N3: the value is one of the program; the frame is as for `all_values`.
+    unsafe {
+        let (vm, _) = parts(context);
+        vm.exchange.values.clear();
+        vm.exchange.values.push(Value::from_bits((*context).value));
+        all_values(context, pc, base)
+    }
 }
 
 /// Overwrites a slot.
