@@ -125,7 +125,7 @@ impl Translator<'_, '_> {
         self.link(window, function, next);
         let (itself, pointer) = (self.itself, self.pointer);
         let address = self.b.ins().func_addr(pointer, itself);
-        let value = self.invoke(window, frame, address, Some(()), want);
+        let value = self.invoke(window, frame, address, true, want);
         self.note_values(window, value, want);
     }
 
@@ -141,7 +141,7 @@ impl Translator<'_, '_> {
         self.go_to(ready);
         self.tick();
         self.link(window, function, next);
-        let value = self.invoke(window, frame, address, None, want);
+        let value = self.invoke(window, frame, address, false, want);
         self.note_values(window, value, want);
     }
 
@@ -169,16 +169,9 @@ impl Translator<'_, '_> {
         self.kept_back = self.kept_back.without(link);
     }
 
-    /// Calls machine code in a frame that has been made, and returns its value. What else it may say than
-    /// that it has returned is dealt with; other numbers of values than one are delivered to the window.
-    pub(crate) fn invoke(
-        &mut self,
-        window: u8,
-        frame: Ssa,
-        given: Ssa,
-        itself: Option<()>,
-        want: Want,
-    ) -> Ssa {
+    /// Calls machine code in a frame that has been made, directly if it is that of the function itself, and
+    /// returns its value. Tail calls are followed. Other numbers of values than one go to the window.
+    pub(crate) fn invoke(&mut self, window: u8, frame: Ssa, given: Ssa, is_itself: bool, want: Want) -> Ssa {
         let (context, base, first) = (self.context, self.base, self.word(0));
         let (again, address) = self.block_with_value();
         let (done, value) = self.block_with_value();
@@ -191,7 +184,7 @@ impl Translator<'_, '_> {
             let (status, value) = (results[0], results[1]);
             this.b.ins().brif(status, other, &[status.into(), value.into()], returned, &[value.into()]);
         };
-        if itself.is_some() {
+        if is_itself {
             let call = self.b.ins().call(self.itself, &[context, frame, first]);
             results(self, call);
             self.b.set_cold_block(again);

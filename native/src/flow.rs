@@ -16,7 +16,7 @@ pub const MAX_INLINED: usize = 48;
 const MAX_INLINED_IN_ALL: usize = 600;
 
 /// Most calls of inlined functions within each other.
-const MAX_DEPTH: usize = 3;
+pub const MAX_DEPTH: usize = 3;
 
 /// Most registers: an operand names one of so many.
 const MAX_REGISTERS: usize = 256;

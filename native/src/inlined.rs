@@ -113,7 +113,7 @@ impl Translator<'_, '_> {
     fn call_in_place(&mut self, window: u8, count: u8, function: Ssa, to: u8) {
         let address = self.replace_frame(window, count, function);
         let frame = self.base_at(self.at);
-        let value = self.invoke(to, frame, address, None, Want::ONE);
+        let value = self.invoke(to, frame, address, false, Want::ONE);
         self.forget(RegisterBits::all_from(to));
         self.set(to, value, Known::Nothing);
     }

@@ -57,7 +57,7 @@ mod translate;
 pub use abi::{
     AGAIN, GUESSED_WRONG, IN_PLACE, NativeContext, NativeReply, REDEFINED, RETURN_VALUES, RETURNED, SIGNAL,
 };
-pub use flow::{MAX_INLINED, may_be_inlined};
+pub use flow::{MAX_DEPTH, MAX_INLINED, may_be_inlined};
 pub use helper::{MachineCodeHelper, MadeCode};
 pub use kinds::Known;
 pub use maker::{FunctionSource, InlinedSource, MachineCode, MachineCodeMaker, NativeSource, NotMade};

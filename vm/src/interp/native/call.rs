@@ -1,13 +1,11 @@
 //! Calls from machine code whose arguments have to be put in order first.
 
-use esl_bytecode::opcode::Opcode;
 use esl_native::NativeContext;
 use esl_native::abi::EntryStub;
 
-use super::super::{aux_at, code_of, constant, in_window, stubs, word_at};
-use super::make_words;
+use super::super::{code_of, in_window, stubs, word_at};
 use super::step::parts;
-use crate::heap::layout::SymbolObject;
+use super::{callee_at, make_words};
 use crate::shape::Shape;
 use crate::value::Value;
 
@@ -54,12 +52,7 @@ unsafe fn arranged(
         let (vm, _) = parts(context);
         let word = word_at(pc);
         let window = base.add(word.a());
-        let function = match word.opcode() {
-            Some(Opcode::CallGlobal | Opcode::TailCallGlobal) => {
-                (*constant(base, aux_at(pc) as usize).object_ptr().cast::<SymbolObject>()).function
-            }
-            _ => *window,
-        };
+        let function = callee_at(pc, base)?;
         let code = code_of(function);
         let end = frame.wrapping_add((*code).nregs as usize).addr() as u64;
         if !Shape::is_bytecode((*code).spare[0])

@@ -5,8 +5,8 @@ use esl_bytecode::operand::Want;
 use esl_native::abi::EntryStub;
 use esl_native::maker::MAX_WORDS;
 use esl_native::{
-    FunctionSource, InlinedSource, Known, MAX_INLINED, MachineCode, MachineCodeHelper, MachineCodeMaker,
-    NativeSource, NotMade, may_be_inlined,
+    FunctionSource, InlinedSource, Known, MAX_DEPTH, MAX_INLINED, MachineCode, MachineCodeHelper,
+    MachineCodeMaker, NativeSource, NotMade, may_be_inlined,
 };
 
 use super::super::{code_of, constants_of, first_instruction, stubs};
@@ -20,9 +20,6 @@ use crate::vm::Vm;
 
 /// Most bytes of machine code of one machine.
 const MOST_BYTES: usize = 32 << 20;
-
-/// Calls of functions within each other that may be inlined.
-const MAX_DEPTH: usize = 3;
 
 /// Most functions that are offered to be inlined in one.
 const MAX_CALLEES: usize = 32;

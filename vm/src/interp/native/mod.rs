@@ -309,6 +309,25 @@ unsafe fn make_words(context: &mut NativeContext) {
     }
 }
 
+/// Returns what the instruction at `pc` calls, if it is a call of a global function or of a value.
+///
+/// # Safety
+/// `pc` is the address of an instruction of the frame `base`.
+unsafe fn callee_at(pc: *const u32, base: *mut Value) -> Option<Value> {
+    // SAFETY: V1, V3, V4: the operands of the instruction are there, and a constant is the symbol.
+    unsafe {
+        let word = word_at(pc);
+        match word.opcode()? {
+            Opcode::CallGlobal | Opcode::TailCallGlobal => {
+                let symbol = constant(base, aux_at(pc) as usize).object_ptr().cast::<SymbolObject>();
+                Some((*symbol).function)
+            }
+            Opcode::Call | Opcode::TailCall => Some(*base.add(word.a())),
+            _ => None,
+        }
+    }
+}
+
 /// Counts a call at which machine code was left, and makes machine code of the callee if there were many.
 /// What the arguments are now is the guess of what they will be.
 ///
@@ -322,13 +341,7 @@ unsafe fn note_call(vm: &mut Vm, pc: u64, base: u64) {
     // SAFETY: V1, V3, V4: the operands of the instruction are there; the function of a symbol is a Function.
     unsafe {
         let word = word_at(pc);
-        let function = match word.opcode() {
-            Some(Opcode::CallGlobal | Opcode::TailCallGlobal) => {
-                (*constant(base, aux_at(pc) as usize).object_ptr().cast::<SymbolObject>()).function
-            }
-            Some(Opcode::Call | Opcode::TailCall) => *base.add(word.a()),
-            _ => return,
-        };
+        let Some(function) = callee_at(pc, base) else { return };
         if !function.is_object() || (*function.object_ptr()).kind != Kind::Function {
             return;
         }
