@@ -348,6 +348,10 @@ pub(super) fn trials() -> Vec<Trial> {
                 a_long_function_is_left_to_the_interpreter,
             ),
             Trial::test("tiers bad case: eval in a loop", machine_code_does_not_pile_up),
+            Trial::test(
+                "tiers bad case: an inlined function is collected",
+                machine_code_goes_with_what_is_inlined,
+            ),
             Trial::test(NO_EXECUTABLE_MEMORY, a_host_may_forbid_executable_memory),
         ])
         .collect()
@@ -386,6 +390,31 @@ fn machine_code_does_not_pile_up() -> Result<(), Failed> {
     let report = &machine.tier().1;
     if report.bytes > (report.functions - 100) * PAGE {
         return Err(format!("nothing was given back: {report:?}").into());
+    }
+    Ok(())
+}
+
+/// Machine code in which a function is inlined that is no more would take another one at its address for it.
+fn machine_code_goes_with_what_is_inlined() -> Result<(), Failed> {
+    let bytes_if_kept = |keep: &str| -> Result<usize, Failed> {
+        let text = format!(
+            "(defvar *kept* nil)
+             (setf (symbol-function 'small) (eval '(lambda (x) (+ x 1))))
+             (defun caller (n) (let ((sum 0)) (dotimes (i n) (setq sum (small sum))) sum))
+             (print (list (caller 5) (caller 5)))
+             (setq *kept* {keep})
+             (setf (symbol-function 'small) (lambda (x) (+ x 2)))
+             (dotimes (i 250) (make-array 20000))"
+        );
+        let config = Config { memory: 48 << 20, ..Config::default() };
+        let mut machine = program::machine(config, Box::new(VirtualHost::new()))?;
+        machine.set_tier(Tier::Native);
+        program::run_in(&mut machine, &compile(&text)?)?;
+        Ok(machine.tier().1.bytes)
+    };
+    let (kept, collected) = (bytes_if_kept("#'small")?, bytes_if_kept("nil")?);
+    if collected >= kept {
+        return Err(format!("{collected} bytes of machine code, {kept} if the function is kept").into());
     }
     Ok(())
 }
