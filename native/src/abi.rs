@@ -30,6 +30,15 @@ pub const STEP_SIGNAL: u64 = 2;
 /// What a helper says of a builtin called in place of the function: its values are in the value list.
 pub const STEP_VALUES: u64 = 3;
 
+/// What a helper says of a call: it is given up, without effect.
+pub const CALL_AGAIN: u64 = 0;
+/// What a helper says of a call: a builtin was called, and its values are where the call wants them.
+pub const CALL_DONE: u64 = 1;
+/// What a helper says of a tail call: a builtin was called, and its values are in the value list.
+pub const CALL_VALUES: u64 = 2;
+/// What a helper says of a call: the machine code is to be left with [`SIGNAL`]. Above it are addresses.
+pub const CALL_SIGNAL: u64 = 3;
+
 /// What is put aside of a register whose place is as it should be: no result of an operation, and no double
 /// that a program has.
 pub const IN_PLACE: u64 = 0x7FF8_1E57_1E57_1E57;
@@ -91,11 +100,13 @@ pub struct NativeContext {
     pub call_builtin: NativeHelper,
     /// Calls the builtin of a `tail-call-builtin`.
     pub tail_builtin: NativeHelper,
-    /// Puts the arguments of a call in the order of the callee's parameters, some of which are not required,
-    /// and returns the address of its machine code; 0, without effect, if that is not done so simply.
-    pub arrange: NativeHelper,
-    /// As `arrange`, for a tail call: the arguments get into the running frame.
-    pub arrange_in_place: NativeHelper,
+    /// Does what is left of a call whose callee does not take exactly the given arguments: puts them in the
+    /// order of its parameters, and returns the address of its machine code; or calls it, tick and all, if it
+    /// is a builtin.
+    pub call_other: NativeHelper,
+    /// As `call_other`, for a tail call: the arguments get into the running frame. A builtin leaves its only
+    /// value in `value`.
+    pub tail_call_other: NativeHelper,
     /// Delivers the value list as what the function in the frame `base` returns.
     pub all_values: NativeHelper,
     /// Delivers `value` as the only one that the function in the frame `base` returns, where more are wanted.

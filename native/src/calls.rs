@@ -10,7 +10,9 @@ use esl_heap::Value;
 use esl_heap::heap::Kind;
 use esl_heap::heap::layout::{CodeObject, FunctionObject, SymbolObject};
 
-use crate::abi::{EntryStub, NativeContext, RETURN_VALUES, RETURNED, STEP_SIGNAL, TAIL};
+use crate::abi::{
+    CALL_AGAIN, CALL_DONE, CALL_SIGNAL, EntryStub, NativeContext, RETURN_VALUES, RETURNED, STEP_SIGNAL, TAIL,
+};
 use crate::emit::{WORD, in_object, memory};
 use crate::kinds::Known;
 use crate::places::RegisterBits;
@@ -29,6 +31,16 @@ pub(crate) fn lookup_of(builtin: u32, count: u8) -> Option<usize> {
         4 if is(Builtin::AddToValue) => Some(offset_of!(NativeContext, add_to_value_of_key)),
         _ => None,
     }
+}
+
+/// What a call in place of the running function has come to.
+pub(crate) struct Replaced {
+    /// Address of the machine code whose frame it is now.
+    pub(crate) address: Ssa,
+    /// Where a builtin goes on that was called, with its only value in the context.
+    pub(crate) one: Block,
+    /// Where a builtin goes on that was called, with its values in the value list.
+    pub(crate) more: Block,
 }
 
 impl Translator<'_, '_> {
@@ -78,14 +90,22 @@ impl Translator<'_, '_> {
         address
     }
 
-    /// Has the machine put arguments in the order of the parameters of a function that takes other numbers of
-    /// arguments too; leaves at this instruction if that is not done. Returns the address of the machine
-    /// code.
-    fn arranged(&mut self, helper: usize) -> Ssa {
-        let exit = self.exit();
-        let address = self.call_helper(helper);
-        self.require(address, exit);
-        address
+    /// Has the machine do what is left of a call whose callee does not take exactly the given arguments;
+    /// leaves at this instruction if that is not done. Returns the address of the callee's machine code; goes
+    /// on in `called`, with what the machine says of the call, if it was a builtin.
+    fn other_callee(&mut self, helper: usize, called: Block) -> Ssa {
+        let (exit, signal, (few, next)) = (self.exit(), self.signal(), (self.cold_block(), self.block()));
+        let outcome = self.call_helper(helper);
+        let is_address = self.b.ins().icmp_imm_u(IntCC::UnsignedGreaterThan, outcome, CALL_SIGNAL as i64);
+        self.branch(is_address, next, few);
+        self.go_to(few);
+        let is_given_up = self.equals(outcome, CALL_AGAIN);
+        self.refuse(is_given_up, exit);
+        let is_signal = self.equals(outcome, CALL_SIGNAL);
+        self.refuse(is_signal, signal);
+        self.jump_with(called, outcome);
+        self.go_to(next);
+        outcome
     }
 
     /// Leaves at this instruction unless there is room for so many registers from `base` on.
@@ -133,15 +153,22 @@ impl Translator<'_, '_> {
     fn call(&mut self, (window, count, want): (u8, u8, Want), function: Ssa, next: usize) {
         let (frame, others, (ready, address)) =
             (self.frame_in(window), self.cold_block(), self.block_with_value());
+        let ((called, _), (done, value)) = (self.block_with_value(), self.block_with_value());
+        self.b.set_cold_block(called);
         let of_exact = self.callee(function, count, frame, others);
         self.jump_with(ready, of_exact);
         self.go_to(others);
-        let of_others = self.arranged(offset_of!(NativeContext, arrange));
+        let of_others = self.other_callee(offset_of!(NativeContext, call_other), called);
         self.jump_with(ready, of_others);
+        self.go_to(called);
+        let first = self.load(self.base, i32::from(window) * WORD);
+        self.jump_with(done, first);
         self.go_to(ready);
         self.tick();
         self.link(window, function, next);
-        let value = self.invoke(window, frame, address, false, want);
+        let first = self.invoke(window, frame, address, false, want);
+        self.jump_with(done, first);
+        self.go_to(done);
         self.note_values(window, value, want);
     }
 
@@ -226,24 +253,32 @@ impl Translator<'_, '_> {
     pub(crate) fn tail_call_global(&mut self, window: u8, count: u8, symbol: u32) {
         self.put_back();
         let function = self.global(symbol);
-        let address = self.replace_frame(window, count, function);
-        self.reply_with(TAIL, address);
-        self.ended();
+        self.tail_call(window, count, function);
     }
 
     pub(crate) fn tail_call_given(&mut self, window: u8, count: u8) {
         self.put_back();
         let (function, exit) = (self.get(window), self.exit());
         self.require_kind(function, Kind::Function, exit);
-        let address = self.replace_frame(window, count, function);
-        self.reply_with(TAIL, address);
-        self.ended();
+        self.tail_call(window, count, function);
     }
 
-    /// Puts the frame of a callee in place of the running one, and returns the address of its machine code.
-    pub(crate) fn replace_frame(&mut self, window: u8, count: u8, function: Ssa) -> Ssa {
+    fn tail_call(&mut self, window: u8, count: u8, function: Ssa) {
+        let Replaced { address, one, more } = self.replace_frame(window, count, function);
+        self.reply_with(TAIL, address);
+        self.go_to(one);
+        let value = self.load_context(offset_of!(NativeContext, value));
+        self.reply_with(RETURNED, value);
+        self.go_to(more);
+        self.return_values();
+    }
+
+    /// Puts the frame of a callee in place of the running one, or calls it if it is a builtin.
+    pub(crate) fn replace_frame(&mut self, window: u8, count: u8, function: Ssa) -> Replaced {
         let (outer, base, others) = (self.base, self.base_at(self.at), self.cold_block());
         let (ready, address) = self.block_with_value();
+        let ((called, outcome), one, more) = (self.block_with_value(), self.cold_block(), self.cold_block());
+        self.b.set_cold_block(called);
         let of_exact = self.callee(function, count, base, others);
         self.tick();
         let arguments: Vec<Ssa> = (0..count).map(|i| self.get(window + 2 + i)).collect();
@@ -252,12 +287,15 @@ impl Translator<'_, '_> {
         }
         self.jump_with(ready, of_exact);
         self.go_to(others);
-        let of_others = self.arranged(offset_of!(NativeContext, arrange_in_place));
+        let of_others = self.other_callee(offset_of!(NativeContext, tail_call_other), called);
         self.tick();
         self.jump_with(ready, of_others);
+        self.go_to(called);
+        let is_one = self.equals(outcome, CALL_DONE);
+        self.branch(is_one, one, more);
         self.go_to(ready);
         self.store(function, outer, self.place(0) + FUNCTION);
-        address
+        Replaced { address, one, more }
     }
 
     /// The square root of a double.

@@ -6,13 +6,14 @@
 
 use std::mem::offset_of;
 
-use cranelift_codegen::ir::{InstBuilder, Value as Ssa};
+use cranelift_codegen::ir::{Block, InstBuilder, Value as Ssa};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::Want;
 use esl_heap::Value;
 use esl_heap::heap::Kind;
 
 use crate::abi::{NativeContext, REDEFINED};
+use crate::calls::Replaced;
 use crate::emit::WORD;
 use crate::flow::FlowStep;
 use crate::kinds::{Known, dropped, returned};
@@ -59,10 +60,7 @@ impl Translator<'_, '_> {
                 let first = self.load_context(offset_of!(NativeContext, value));
                 self.jump_with(done, first);
                 self.go_to(more);
-                self.deliver_values();
-                let base = self.base;
-                let first = self.load(base, i32::from(to) * WORD);
-                self.jump_with(done, first);
+                self.first_of_values(to, done);
                 self.go_to(done);
                 self.forget(above);
                 self.set(to, value, Known::Nothing);
@@ -111,11 +109,26 @@ impl Translator<'_, '_> {
 
     /// Calls a function in the frame of the running one.
     fn call_in_place(&mut self, window: u8, count: u8, function: Ssa, to: u8) {
-        let address = self.replace_frame(window, count, function);
-        let frame = self.base_at(self.at);
-        let value = self.invoke(to, frame, address, false, Want::ONE);
+        let Replaced { address, one, more } = self.replace_frame(window, count, function);
+        let (frame, (done, value)) = (self.base_at(self.at), self.block_with_value());
+        let first = self.invoke(to, frame, address, false, Want::ONE);
+        self.jump_with(done, first);
+        self.go_to(one);
+        let first = self.load_context(offset_of!(NativeContext, value));
+        self.jump_with(done, first);
+        self.go_to(more);
+        self.first_of_values(to, done);
+        self.go_to(done);
         self.forget(RegisterBits::all_from(to));
         self.set(to, value, Known::Nothing);
+    }
+
+    /// Returns the value list from the running frame, and goes on with its first value, which is delivered to
+    /// a register.
+    fn first_of_values(&mut self, to: u8, done: Block) {
+        self.deliver_values();
+        let first = self.load(self.base, i32::from(to) * WORD);
+        self.jump_with(done, first);
     }
 
     /// Has the machine return the value list from the running frame, which delivers the first one.

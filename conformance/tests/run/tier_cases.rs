@@ -27,7 +27,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 ";
 
 /// Name and text of each.
-const CASES: [(&str, &str); 15] = [
+const CASES: [(&str, &str); 16] = [
     (
         "functions redefined while they run",
         "(defun step-of (x) (+ x 1))
@@ -302,6 +302,38 @@ const CASES: [(&str, &str); 15] = [
          (dotimes (i 5) (print (handler-case (set-constant 1.0) (error (e) (type-of e)))))
          (defun deep (n) (if (= n 0) (list *x* *y*) (let ((*x* (+ *x* 1.0)) (*y* n)) (deep (- n 1)))))
          (print (deep 100)) (print (deep 2000)) (print (list *x* *y* *z*))",
+    ),
+    (
+        "builtins called as functions",
+        "(defun one (f x) (+ 0.5 (funcall f x 3)))
+         (defun several (f x) (multiple-value-bind (a b c) (funcall f x 3) (list a b c)))
+         (defun all (f x) (multiple-value-call #'list (funcall f x 3) (funcall f 3 x)))
+         (defun tail (f x) (funcall f x 3))
+         (defun call-through (f x) (let ((y (* x 1.5))) (list (tail f x) y)))
+         (defun second-of (f x) (nth-value 1 (tail f x)))
+         (defun calls (g f n)
+           (let ((sum 0) (last nil))
+             (dotimes (i n)
+               (setq last (funcall g f i))
+               (when (numberp last) (setq sum (+ sum last))))
+             (list sum last)))
+         (dolist (f (list #'+ #'floor #'list #'values #'cons #'funcall #'gethash #'1+ #'equal #'max
+                          (lambda (x y) (values y x))))
+           (dolist (g (list #'one #'several #'all #'tail #'call-through #'second-of))
+             (print (handler-case (calls g f 200) (error (e) (type-of e))))))
+         (defun on-long (f x y n) (let ((last nil)) (dotimes (i n) (setq last (funcall f x y))) last))
+         (defun on-long-in-place (f x y) (funcall f x y))
+         (let ((x (make-list 30000 :initial-element 1)) (y (make-list 30000 :initial-element 1)))
+           (print (on-long #'equal x y 40))
+           (dotimes (i 40) (on-long-in-place #'equal x y))
+           (print (on-long-in-place #'equal x y))
+           (print (let ((*print-length* 3)) (prin1-to-string (on-long #'append x y 5)))))
+         (defun last-of (f n) (let ((list nil)) (dotimes (i n (car list)) (setq list (funcall f i list)))))
+         (print (last-of #'cons 20000))
+         (defun ends (f n) (dotimes (i n) (funcall f i)) :end)
+         (print (ends #'identity 3000))
+         (print (handler-case (ends #'car 3000) (type-error (e) (type-error-datum e))))
+         (print (handler-case (ends #'error 300) (error (e) (type-of e))))",
     ),
     (
         "pairs of doubles and of other values",

@@ -205,7 +205,9 @@ impl RandomNumbers {
              (defun o0 (a &optional (b 2.5)) (- b a))\n\
              (defun o1 (a &rest others) (if others (+ a (car others)) (* a 0.5)))\n\
              (defun o2 (&key (by 3) of) (if of (* by of) (o0 by)))\n\
-             (defun o3 (a &optional b) (if b (o1 b a 1) (o2 :by a)))\n",
+             (defun o3 (a &optional b) (if b (o1 b a 1) (o2 :by a)))\n\
+             (defun o4 (f a b) (funcall f a b))\n\
+             (defun o5 (f a b) (multiple-value-list (funcall f a b)))\n",
         );
         for number in 0..SMALL {
             let _ = writeln!(text, "(defun g{number} (a b) {})", self.small(number));
@@ -258,6 +260,11 @@ impl RandomNumbers {
         self.pick(&CONSTANTS)
     }
 
+    /// Returns the name of a function of two numbers, most of them builtins.
+    fn callee(&mut self) -> &'static str {
+        self.pick(&["+", "-", "max", "floor", "truncate", "mod", "<", "values", "1+", "expt", "f0", "o0"])
+    }
+
     fn leaf(&mut self) -> &'static str {
         if self.below(3) == 0 { self.constant() } else { self.pick(&["a", "b"]) }
     }
@@ -288,12 +295,14 @@ impl RandomNumbers {
             10 => format!("(logand (floor {x}) 255)"),
             11 => format!("(f0 {x} {y})"),
             12 => format!("(o0 {x})"),
-            13 => match self.below(6) {
+            13 => match self.below(9) {
                 0 => format!("(o1 {x} {y} 3)"),
                 1 => format!("(o1 {x})"),
                 2 => format!("(o2 :of {x} :by {y})"),
                 3 => format!("(o3 {x} {y})"),
                 4 => format!("(o3 {x})"),
+                5 | 6 => format!("(o4 #'{} {x} {y})", self.callee()),
+                7 => format!("(car (o5 #'{} {x} {y}))", self.callee()),
                 _ => format!("(o0 {x} {y})"),
             },
             _ => format!("(g{} {x} {y})", self.below(SMALL)),

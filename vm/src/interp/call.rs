@@ -10,7 +10,7 @@ use esl_bytecode::word::Word;
 
 use super::arguments::{arrange, count_of_arguments, describe_arity, spread};
 use super::substitute::{deliver, return_all, substitute};
-use super::{Signal, aux_at, code_of, constant, failure, first_instruction, pc_as_value, stubs, word_at};
+use super::{Signal, aux_at, code_of, constant, first_instruction, pc_as_value, stubs, word_at};
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::Arguments;
 use crate::raise::{Exit, Raised};
@@ -149,37 +149,15 @@ pub(super) unsafe fn call(
 /// # Safety
 /// The contract of [`call`].
 unsafe fn call_native(vm: &mut Vm, number: u16, arguments: *const [Value], place: FramePlace) -> Signal {
-    vm.cpu.wants_one = false;
-    let info = &BUILTINS[usize::from(number)];
-    let count = arguments.len();
-    let max = info.arity.max.map_or(usize::MAX, |max| max as usize);
-    if count < info.arity.min as usize || count > max {
-        let text = format!("{} was called with {}", info.name, count_of_arguments(count));
-        let text = format!("{text}; it takes {}", describe_arity(info.arity.min as usize, info.arity.max));
-        return failure(vm, Raised::Program(text));
-    }
-    // SAFETY: by the contract the arguments are live; no builtin writes to the stack or moves it.
-    match vm.natives[usize::from(number)](vm, unsafe { &*arguments }) {
+    // SAFETY: the contract is the same.
+    match unsafe { apply_native(vm, number, arguments) } {
         Ok(value) => {
             vm.exchange.values.clear();
             vm.exchange.values.push(value);
         }
         Err(Exit::Values) => {}
-        Err(Exit::Slowly) => {
-            return match vm.twin_of(info) {
-                // SAFETY: the builtin has left `vm.cpu` as it was, so the contract still holds. A twin is no
-                // builtin, so this goes one level deep.
-                Ok(function) => unsafe { call(vm, function, arguments, place) },
-                Err(exit) => Signal::Exit(exit),
-            };
-        }
-        Err(Exit::Call) => {
-            let (function, arguments) = vm.exchange.take_requested_call();
-            // SAFETY: the builtin has left `vm.cpu` as it was, so the contract still holds. A builtin that
-            // asks for itself would go on for ever, and none does.
-            return unsafe { call(vm, function, &*arguments, place) };
-        }
-        Err(exit) => return Signal::Exit(exit),
+        // SAFETY: the contract is the same.
+        Err(exit) => return unsafe { call_instead(vm, exit, number, arguments, place) },
     }
     if vm.wants_safepoint() {
         vm.cpu.ticks = vm.prepare_safepoint(vm.cpu.ticks);
@@ -201,6 +179,56 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: *const [Value], place
                 Signal::Reload
             }
         }
+    }
+}
+
+/// Applies a builtin to arguments, if it takes so many.
+///
+/// # Safety
+/// `arguments` may be read as long as the stack stays in place.
+pub(super) unsafe fn apply_native(
+    vm: &mut Vm,
+    number: u16,
+    arguments: *const [Value],
+) -> Result<Value, Exit> {
+    vm.cpu.wants_one = false;
+    let info = &BUILTINS[usize::from(number)];
+    let count = arguments.len();
+    let max = info.arity.max.map_or(usize::MAX, |max| max as usize);
+    if count < info.arity.min as usize || count > max {
+        let text = format!("{} was called with {}", info.name, count_of_arguments(count));
+        let text = format!("{text}; it takes {}", describe_arity(info.arity.min as usize, info.arity.max));
+        return vm.exchange.program_error(text);
+    }
+    // SAFETY: by the contract the arguments are live; no builtin writes to the stack or moves it.
+    vm.natives[usize::from(number)](vm, unsafe { &*arguments })
+}
+
+/// Calls what a builtin asks for that has come to `exit`: the library's function that takes over from it, or
+/// another one.
+///
+/// # Safety
+/// The contract of [`call`], for the arguments of the builtin, which has left `vm.cpu` as it was.
+pub(super) unsafe fn call_instead(
+    vm: &mut Vm,
+    exit: Exit,
+    number: u16,
+    arguments: *const [Value],
+    place: FramePlace,
+) -> Signal {
+    match exit {
+        Exit::Slowly => match vm.twin_of(&BUILTINS[usize::from(number)]) {
+            // SAFETY: the contract still holds. A twin is no builtin, so this goes one level deep.
+            Ok(function) => unsafe { call(vm, function, arguments, place) },
+            Err(exit) => Signal::Exit(exit),
+        },
+        Exit::Call => {
+            let (function, arguments) = vm.exchange.take_requested_call();
+            // SAFETY: the contract still holds. A builtin that asks for itself would go on for ever, and none
+            // does.
+            unsafe { call(vm, function, &*arguments, place) }
+        }
+        exit => Signal::Exit(exit),
     }
 }
 

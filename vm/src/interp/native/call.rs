@@ -1,37 +1,81 @@
-//! Calls from machine code whose arguments have to be put in order first.
+//! Calls from machine code of others than functions that take exactly the given arguments: the arguments are
+//! put in order first, or a builtin is called.
 
 use esl_native::NativeContext;
-use esl_native::abi::EntryStub;
+use esl_native::abi::{CALL_AGAIN, CALL_DONE, CALL_SIGNAL, CALL_VALUES, EntryStub};
 
-use super::super::{code_of, in_window, stubs, word_at};
-use super::step::parts;
+use super::super::call::{FramePlace, apply_native, call_instead};
+use super::super::{code_of, in_window, stubs, substitute, word_at};
+use super::step::{attend, leave, parts};
 use super::{callee_at, make_words};
-use crate::shape::Shape;
+use crate::heap::layout::CodeObject;
+use crate::raise::Exit;
+use crate::shape::{Shape, Sort};
 use crate::value::Value;
 
-/// Puts the arguments of a call in order in its window.
-pub(super) unsafe extern "C" fn arrange(context: *mut NativeContext, pc: *const u32, base: *mut u64) -> u64 {
-    // SAFETY: machine code calls this at such an instruction of the frame at `base`.
-    unsafe {
-        let base = base.cast::<Value>();
-        let window = base.add(word_at(pc).a());
-        arranged(context, pc, base, window.add(2)).map_or(0, |(address, _)| address)
-    }
-}
-
-/// Puts the arguments of a tail call in order in the running frame.
-pub(super) unsafe extern "C" fn arrange_in_place(
+/// Does what is left of a call: see [`NativeContext::call_other`].
+pub(super) unsafe extern "C" fn call_other(
     context: *mut NativeContext,
     pc: *const u32,
     base: *mut u64,
 ) -> u64 {
-    // SAFETY: machine code calls this at such an instruction of the frame at `base`; the callee's registers
-    // have room there.
+    // SAFETY: machine code calls this at such an instruction of the frame at `base`, whose callee is a
+    // Function; V3: the window has the registers that the call wants.
     unsafe {
         let base = base.cast::<Value>();
-        let Some((address, parameters)) = arranged(context, pc, base, base) else { return 0 };
-        std::ptr::copy(base.add(word_at(pc).a() + 2), base, parameters);
-        address
+        make_words(&mut *context);
+        let Some(function) = callee_at(pc, base) else { return CALL_AGAIN };
+        let (code, word) = (code_of(function), word_at(pc));
+        let window = base.add(word.a());
+        let shape = Shape::unpack((*code).spare[0]);
+        if shape.sort != Sort::Native {
+            let arranged = arrange(context, pc, base, code, window.add(2));
+            return arranged.map_or(CALL_AGAIN, |(address, _)| address);
+        }
+        match call_builtin(context, pc, base, shape.number, FramePlace::Window) {
+            Ok(value) if word.c() == 0 => *window = value,
+            Ok(value) => {
+                let (vm, _) = parts(context);
+                vm.exchange.values.clear();
+                vm.exchange.values.push(value);
+                substitute::deliver(vm, window, word.c());
+            }
+            Err(CALL_VALUES) => {
+                let (vm, _) = parts(context);
+                substitute::deliver(vm, window, word.c());
+            }
+            Err(outcome) => return outcome,
+        }
+        CALL_DONE
+    }
+}
+
+/// Does what is left of a tail call: see [`NativeContext::tail_call_other`].
+pub(super) unsafe extern "C" fn tail_call_other(
+    context: *mut NativeContext,
+    pc: *const u32,
+    base: *mut u64,
+) -> u64 {
+    // SAFETY: machine code calls this at such an instruction of the frame at `base`, whose callee is a
+    // Function, and has its registers in place of that frame's if it has a frame.
+    unsafe {
+        let base = base.cast::<Value>();
+        make_words(&mut *context);
+        let Some(function) = callee_at(pc, base) else { return CALL_AGAIN };
+        let code = code_of(function);
+        let shape = Shape::unpack((*code).spare[0]);
+        if shape.sort != Sort::Native {
+            let Some((address, parameters)) = arrange(context, pc, base, code, base) else {
+                return CALL_AGAIN;
+            };
+            std::ptr::copy(base.add(word_at(pc).a() + 2), base, parameters);
+            return address;
+        }
+        match call_builtin(context, pc, base, shape.number, FramePlace::Tail) {
+            Ok(value) => (*context).value = value.bits(),
+            Err(outcome) => return outcome,
+        }
+        CALL_DONE
     }
 }
 
@@ -39,21 +83,18 @@ pub(super) unsafe extern "C" fn arrange_in_place(
 /// and room for its frame at `frame`. Returns the address of the machine code, and the number of parameters.
 ///
 /// # Safety
-/// That of a helper, at a call whose callee is a Function.
-unsafe fn arranged(
+/// That of a helper, at a call of a function with this code.
+unsafe fn arrange(
     context: *mut NativeContext,
     pc: *const u32,
     base: *mut Value,
+    code: *mut CodeObject,
     frame: *mut Value,
 ) -> Option<(u64, usize)> {
-    // SAFETY: V3, V4: the operands of the instruction are there; the function of a symbol is a Function.
+    // SAFETY: V3: the operands of the instruction are there.
     unsafe {
-        make_words(&mut *context);
         let (vm, _) = parts(context);
         let word = word_at(pc);
-        let window = base.add(word.a());
-        let function = callee_at(pc, base)?;
-        let code = code_of(function);
         let end = frame.wrapping_add((*code).nregs as usize).addr() as u64;
         if !Shape::is_bytecode((*code).spare[0])
             || *(*code).entry != u32::from(stubs::NATIVE_ENTRY)
@@ -62,7 +103,47 @@ unsafe fn arranged(
         {
             return None;
         }
-        let parameters = in_window::arrange(vm, code, window.add(2), word.b())?;
+        let parameters = in_window::arrange(vm, code, base.add(word.a() + 2), word.b())?;
         Some(((*(*code).entry.cast::<EntryStub>()).address, parameters))
+    }
+}
+
+/// Takes the tick of a call of a builtin, and calls it. Returns its value.
+///
+/// # Errors
+/// What is to be said of the call if that is another outcome.
+///
+/// # Safety
+/// That of a helper, at a call of the builtin with this number.
+unsafe fn call_builtin(
+    context: *mut NativeContext,
+    pc: *const u32,
+    base: *mut Value,
+    number: u16,
+    place: FramePlace,
+) -> Result<Value, u64> {
+    // SAFETY: V3: the window holds the arguments. What a builtin asks for is called as from the loop, which
+    // goes on in the frame that this makes.
+    unsafe {
+        if (*context).ticks <= 0 {
+            return Err(CALL_AGAIN);
+        }
+        (*context).ticks -= 1;
+        let (vm, _) = parts(context);
+        let word = word_at(pc);
+        let arguments = std::ptr::slice_from_raw_parts(base.add(word.a() + 2), word.b());
+        vm.cpu.set_pc(pc);
+        vm.cpu.set_base(base);
+        let result = apply_native(vm, number, arguments);
+        match result {
+            Ok(_) | Err(Exit::Values) => attend(context, vm),
+            Err(exit) => {
+                let signal = call_instead(vm, exit, number, arguments, place);
+                let (pc, base) = (vm.cpu.pc(), vm.cpu.base());
+                leave(context, signal, pc, base);
+                return Err(CALL_SIGNAL);
+            }
+        }
+        result.map_err(|_| CALL_VALUES)
     }
 }

@@ -52,7 +52,12 @@ pub(super) unsafe fn parts<'a>(context: *mut NativeContext) -> (&'a mut Vm, *mut
 ///
 /// # Safety
 /// That of a helper.
-unsafe fn leave(context: *mut NativeContext, signal: Signal, pc: *const u32, base: *mut Value) -> u64 {
+pub(super) unsafe fn leave(
+    context: *mut NativeContext,
+    signal: Signal,
+    pc: *const u32,
+    base: *mut Value,
+) -> u64 {
     // SAFETY: by the contract the context is that of `run`.
     unsafe {
         (*(*context).machine.cast::<Caller>()).signal = signal;
@@ -66,7 +71,7 @@ unsafe fn leave(context: *mut NativeContext, signal: Signal, pc: *const u32, bas
 ///
 /// # Safety
 /// That of a helper.
-unsafe fn attend(context: *mut NativeContext, vm: &mut Vm) {
+pub(super) unsafe fn attend(context: *mut NativeContext, vm: &mut Vm) {
     // SAFETY: by the contract the context is that of `run`.
     unsafe {
         if vm.wants_safepoint() {
