@@ -21,6 +21,12 @@ use crate::vm::Vm;
 /// Most bytes of machine code of one machine.
 const MOST_BYTES: usize = 32 << 20;
 
+/// Most bytes of machine code, as a part of what the machine's heap may have.
+const MOST_OF_HEAP: usize = 8;
+
+/// Most orders that are given and not answered.
+const MOST_ORDERS: usize = 64;
+
 /// Most functions that are offered to be inlined in one.
 const MAX_CALLEES: usize = 32;
 
@@ -48,8 +54,9 @@ pub(in crate::interp) unsafe fn make_at_entry(vm: &mut Vm, base: *mut Value) {
 /// # Safety
 /// `code` points to a Code of bytecode.
 pub(super) unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known>) {
+    let most = MOST_BYTES.min(vm.config.memory / MOST_OF_HEAP);
     let compiled = &mut vm.compiled;
-    if compiled.report.refused.is_some() || compiled.report.bytes > MOST_BYTES {
+    if compiled.report.refused.is_some() || compiled.report.bytes > most {
         return;
     }
     // SAFETY: the contract says that this is a live Code, whose entry leads to an operation of the loop.
@@ -62,6 +69,10 @@ pub(super) unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known
         let word = Value::from_object(code.cast()).bits();
         if compiled.asked.values().any(|order| (order.code, order.has_guesses) == (word, has_guesses)) {
             return;
+        }
+        if compiled.asked.len() == MOST_ORDERS {
+            // It is asked for when it has been met as often again.
+            return compiled.heat.forget(code.addr() as u64);
         }
         let source = source_of(compiled, code, guesses);
         let inlined = source.inlined.iter().map(|inlined| inlined.callee.bits()).collect();

@@ -37,11 +37,15 @@ use make::{install_made, instructions, make, uninstall};
 /// Words of the stack that one entry may use, which bounds the native stack too: about 500 KB.
 const WORDS_AT_ONCE: usize = 4096;
 
-/// How often a function is found running at the end of a slice before machine code is made of it.
-const HOT: u32 = 2;
+/// How often a function is found running at the end of a slice, or machine code is left at a call of it,
+/// before machine code is made of it. To make that takes as long as some dozen slices.
+const HOT: u32 = 32;
 
-/// How often machine code is left at a call before machine code is made of the callee.
-const HOT_CALLS: u32 = 32;
+/// Ticks of so many slices together; longer slices are asked for less often.
+const HOT_TICKS: u32 = 64_000;
+
+/// Fewest slices at whose ends it is found.
+const LEAST_SLICES: u32 = 2;
 
 /// Entries at loop instructions after which their use is looked at.
 const ENTRIES: u32 = 1024;
@@ -349,7 +353,7 @@ unsafe fn note_call(vm: &mut Vm, pc: u64, base: u64) {
         if !Shape::is_bytecode((*code).spare[0]) {
             return;
         }
-        if vm.compiled.heat.count(code.addr() as u64) == HOT_CALLS {
+        if vm.compiled.heat.count(code.addr() as u64) == HOT {
             // Where others than these are taken too, the registers get them in another order.
             let count = if (*code).arity == word.b() as u32 { word.b() } else { 0 };
             let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), count);
@@ -427,6 +431,7 @@ impl Vm {
             return;
         }
         install_made(&mut self.compiled);
+        let of_slices = (HOT_TICKS / self.config.slice.max(1)).clamp(LEAST_SLICES, HOT);
         let frames = self.frames().take(FRAMES);
         let functions: Vec<_> = frames.map(|frame| (frame.function, frame.registers().to_vec())).collect();
         for (function, registers) in functions {
@@ -435,7 +440,7 @@ impl Vm {
                 let code = code_of(function);
                 let is_stub = (*code).nwords < 2;
                 let heat = self.compiled.heat.count(code.addr() as u64);
-                if matches!(heat, HOT | HOT_CALLS) && !is_stub {
+                if (heat == of_slices || heat == HOT) && !is_stub {
                     make(self, code, registers.into_iter().map(Known::of).collect());
                 }
             }
