@@ -61,11 +61,10 @@ pub(crate) enum EslvmAction {
         #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
         stats: Option<Stats>,
         /// How functions run, which no program can tell: by the interpreter, all as machine code, or as
-        /// machine code those that are hot. A build without the cargo feature `native` says so, and
-        /// interprets all
-        #[arg(long, value_enum, default_value_t = TierChoice::Interpreter, value_name = "TIER")]
-        #[arg(conflicts_with = "schedule")]
-        tier: TierChoice,
+        /// machine code those that are hot, which is the default. A build without the cargo feature `native`
+        /// says that the option has no effect, and interprets all
+        #[arg(long, value_enum, value_name = "TIER", conflicts_with = "schedule")]
+        tier: Option<TierChoice>,
         /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
         /// Perfetto
         #[arg(long, value_name = "FILE")]

@@ -12,6 +12,7 @@ use esl::profile::{INTERVAL, Profile, ProfileUnit};
 use esl::program::{self, Ended, Program};
 use esl::replay::{self, FileRecorder, RunSetup};
 use esl::timeline::Timeline;
+use esl_vm::vm::Tier;
 
 use crate::figures::{print_functions, print_stats, print_tasks};
 use crate::options::{ClockChoice, MachineOptions, Stats, TierChoice};
@@ -20,7 +21,7 @@ use crate::program::{complain_of_signal, program};
 /// What is to be seen of a run.
 pub(crate) struct RunReports<'a> {
     pub(crate) stats: Option<Stats>,
-    pub(crate) tier: TierChoice,
+    pub(crate) tier: Option<TierChoice>,
     pub(crate) timeline: Option<&'a Path>,
     pub(crate) record: Option<&'a Path>,
     pub(crate) profile: Option<&'a Path>,
@@ -109,8 +110,10 @@ pub(crate) fn run(
     if is_covered {
         machine.count_passages();
     }
-    machine.set_tier(tier.into());
-    if let Some(reason) = &machine.tier().1.refused {
+    // Runs by a schedule end within few turns.
+    let default = if schedule.is_some() { Tier::Interpreter } else { Tier::Auto };
+    machine.set_tier(tier.map_or(default, Tier::from));
+    if let (Some(_), Some(reason)) = (tier, &machine.tier().1.refused) {
         eprintln!("eslvm: --tier has no effect: {reason}");
     }
     let served = operate.begin(&mut machine)?;
