@@ -5,7 +5,8 @@
 //! that of the frame of the function itself, which the frames above it continue.
 
 use esl_bytecode::opcode::{Instr, Opcode};
-use esl_bytecode::operand::{Role, Want};
+use esl_bytecode::operand::{Count, Role, Want, Window};
+use esl_heap::Value;
 
 use crate::maker::{FunctionSource, InlinedSource, NativeSource};
 
@@ -24,6 +25,12 @@ const MAX_REGISTERS: usize = 256;
 /// Returns whether a function of these instructions is so small and so simple that its calls may be replaced
 /// by its instructions.
 pub fn may_be_inlined(words: &[u32]) -> bool {
+    is_simple(words, |opcode| opcode != Opcode::CallSelf)
+}
+
+/// Returns whether instructions are few, and go on one after the other but for jumps forward, calls and
+/// returns; with what `may_be_there` says of their opcodes.
+fn is_simple(words: &[u32], may_be_there: impl Fn(Opcode) -> bool) -> bool {
     if words.len() > MAX_INLINED {
         return false;
     }
@@ -31,9 +38,9 @@ pub fn may_be_inlined(words: &[u32]) -> bool {
     while at < words.len() {
         let Some(instr) = Instr::decode(words, at) else { return false };
         let opcode = instr.opcode();
-        let is_simple = !opcode.is_loop()
-            && !matches!(opcode, Opcode::CallSelf | Opcode::Apply | Opcode::TailApply | Opcode::Throw);
-        if !is_simple {
+        let is_simple =
+            !opcode.is_loop() && !matches!(opcode, Opcode::Apply | Opcode::TailApply | Opcode::Throw);
+        if !is_simple || !may_be_there(opcode) {
             return false;
         }
         at += opcode.words();
@@ -87,10 +94,19 @@ pub(crate) struct FlowFrame<'a> {
     pub(crate) first: usize,
     /// The register that its first one is.
     pub(crate) base: u8,
-    /// The inlined function, unless it is the function itself.
-    pub(crate) inlined: Option<&'a InlinedSource>,
+    /// The function that the symbol of the call must have, for one that was inlined by its name.
+    pub(crate) guard: Option<Value>,
+    /// Number of the optional parameters that get no argument.
+    pub(crate) unsupplied: u8,
     /// Where an inlined function returns to.
     back: Option<Back>,
+}
+
+/// What is inlined at a call.
+struct InlinedCall<'a> {
+    source: &'a FunctionSource,
+    guard: Option<Value>,
+    unsupplied: u8,
 }
 
 /// Where an inlined function returns to.
@@ -127,7 +143,14 @@ impl<'a> NativeFlow<'a> {
         let mut flow = NativeFlow {
             steps: vec![None; function.words.len()],
             loops,
-            frames: vec![FlowFrame { source: function, first: 0, base: 0, inlined: None, back: None }],
+            frames: vec![FlowFrame {
+                source: function,
+                first: 0,
+                base: 0,
+                guard: None,
+                unsupplied: 0,
+                back: None,
+            }],
             registers: function.registers,
         };
         let mut edges = Vec::new();
@@ -172,11 +195,11 @@ impl<'a> NativeFlow<'a> {
             frame: number,
             change: FrameChange::None,
         };
-        if let (Some(callee), Instr::CallGlobal { window, count, .. }) = (callee, instr) {
+        if let (Some(callee), Some((window, count))) = (callee, call_of(&instr)) {
             let (first, base) = (self.steps.len(), window.0 + 2);
             let back = Some(Back { frame: number, to: window.0, next });
-            let source = &callee.function;
-            self.frames.push(FlowFrame { source, first, base, inlined: Some(callee), back });
+            let InlinedCall { source, guard, unsupplied } = callee;
+            self.frames.push(FlowFrame { source, first, base, guard, unsupplied, back });
             self.steps.resize(first + source.words.len(), None);
             self.registers = self.registers.max(usize::from(base) + source.registers);
             step.target = Some(first);
@@ -192,30 +215,56 @@ impl<'a> NativeFlow<'a> {
         Some(step)
     }
 
-    /// Returns the function that an instruction of a frame calls, if it is inlined there.
-    fn callee(&self, frame: usize, instr: &Instr, inlined: &'a [InlinedSource]) -> Option<&'a InlinedSource> {
-        let Instr::CallGlobal { window, count, want: Want::ONE, symbol } = *instr else { return None };
+    /// Returns what an instruction of a frame calls, if that is inlined there: a small function that it names,
+    /// or the function itself, once.
+    fn callee(&self, frame: usize, instr: &Instr, inlined: &'a [InlinedSource]) -> Option<InlinedCall<'a>> {
+        let (window, count) = call_of(instr)?;
         let caller = &self.frames[frame];
-        let symbol = *caller.source.constants.get(symbol.0 as usize)?;
-        let takes_them = |callee: &&InlinedSource| {
-            callee.required <= count.0 && count.0 - callee.required <= callee.optional
+        let callee = match *instr {
+            Instr::CallSelf { .. } => {
+                let source = caller.source;
+                // Where variables are bound, the calls take less of the time.
+                let is_inlined = frame == 0 && is_simple(&source.words, |opcode| opcode != Opcode::Bind);
+                is_inlined.then_some(InlinedCall { source, guard: None, unsupplied: 0 })?
+            }
+            Instr::CallGlobal { symbol, .. } => {
+                let symbol = *caller.source.constants.get(symbol.0 as usize)?;
+                let callee = inlined.iter().find(|callee| callee.symbol == symbol)?;
+                let optional = count.0.checked_sub(callee.required)?;
+                let unsupplied = callee.optional.checked_sub(optional)?;
+                if self.is_within(frame, &callee.function) {
+                    return None;
+                }
+                InlinedCall { source: &callee.function, guard: Some(callee.callee), unsupplied }
+            }
+            _ => return None,
         };
-        let callee = inlined.iter().find(|callee| callee.symbol == symbol).filter(takes_them)?;
-        let source = &callee.function;
         let base = usize::from(caller.base) + usize::from(window.0) + 2;
         let words = self.steps.len() - self.frames[0].source.words.len();
-        let (mut depth, mut around) = (1, Some(frame));
-        while let Some(frame) = around.map(|number| &self.frames[number]) {
-            if frame.source.words_at == source.words_at {
-                return None;
-            }
-            around = frame.back.map(|back| back.frame);
-            depth += usize::from(around.is_some());
-        }
-        let fits = depth <= MAX_DEPTH
-            && base + source.registers <= MAX_REGISTERS
-            && words + source.words.len() <= MAX_INLINED_IN_ALL;
+        let fits = self.around(frame).count() <= MAX_DEPTH
+            && base + callee.source.registers <= MAX_REGISTERS
+            && words + callee.source.words.len() <= MAX_INLINED_IN_ALL;
         fits.then_some(callee)
+    }
+
+    /// Returns a frame, and those in which it is inlined.
+    fn around(&self, frame: usize) -> impl Iterator<Item = &FlowFrame<'a>> {
+        let outer = |frame: &&FlowFrame<'a>| frame.back.map(|back| &self.frames[back.frame]);
+        std::iter::successors(Some(&self.frames[frame]), outer)
+    }
+
+    /// Returns whether a frame is one of this function, or inlined in one.
+    fn is_within(&self, frame: usize, function: &FunctionSource) -> bool {
+        self.around(frame).any(|frame| frame.source.words_at == function.words_at)
+    }
+}
+
+/// Returns window and number of arguments of a call that may be inlined.
+fn call_of(instr: &Instr) -> Option<(Window, Count)> {
+    match *instr {
+        Instr::CallGlobal { window, count, want: Want::ONE, .. }
+        | Instr::CallSelf { window, count, want: Want::ONE, .. } => Some((window, count)),
+        _ => None,
     }
 }
 

@@ -24,12 +24,17 @@ impl Translator<'_, '_> {
     /// Makes the frame of an inlined function, and goes on with its first instruction.
     pub(crate) fn enter_inlined(&mut self, window: u8, count: u8, step: &FlowStep) {
         let callee = step.target.map(|first| self.flow.frames[self.flow.frame_at(first)]);
-        let (Some(callee), Instr::CallGlobal { symbol, .. }) = (callee, step.instr) else { return };
-        let Some(inlined) = callee.inlined else { return };
-        let function = self.global(symbol.0);
-        let (is_same, redefined) =
-            (self.equals(function, inlined.callee.bits()), self.way_out(self.at, REDEFINED));
-        self.require(is_same, redefined);
+        let Some(callee) = callee else { return };
+        let function = match (step.instr, callee.guard) {
+            (Instr::CallGlobal { symbol, .. }, Some(guard)) => {
+                let function = self.global(symbol.0);
+                let (is_same, redefined) =
+                    (self.equals(function, guard.bits()), self.way_out(self.at, REDEFINED));
+                self.require(is_same, redefined);
+                function
+            }
+            _ => self.running(),
+        };
         let registers = i64::from(callee.base) + callee.source.registers as i64;
         let top = self.b.ins().iadd_imm_s(self.base, registers * i64::from(WORD));
         self.require_room_below(top);
@@ -41,9 +46,9 @@ impl Translator<'_, '_> {
         self.clear_places(above);
         self.forget(dropped);
         self.link(window, function, step.next);
-        for missing in count..inlined.required + inlined.optional {
+        for missing in 0..callee.unsupplied {
             let unsupplied = self.constant_value(Value::UNSUPPLIED);
-            self.set(window + 2 + missing, unsupplied, Known::Nothing);
+            self.set(window + 2 + count + missing, unsupplied, Known::Nothing);
         }
         let target = self.target(step);
         self.jump(target);

@@ -27,10 +27,10 @@
 //!   while nothing is marked ([`NativeContext::is_marking`]), or where it holds no address.
 //! * **N7, native stack.** A frame of machine code holds nothing that another one needs. There are as many as
 //!   fit between the base at the entry and [`NativeContext::limit`], which the interpreter keeps near.
-//! * **N8, inlined functions.** A call of a global function may be replaced by the instructions of the
-//!   function. Its frame is made all the same, so that N3 to N5 hold within it. The call is given up, with
-//!   [`REDEFINED`], if the symbol has another function by then. So the machine code is good only as long as
-//!   the functions inlined in it are there.
+//! * **N8, inlined functions.** A call of a global function, or of the running one, may be replaced by the
+//!   instructions of the function. Its frame is made all the same, so that N3 to N5 hold within it. The call
+//!   of a global function is given up, with [`REDEFINED`], if the symbol has another function by then. So the
+//!   machine code is good only as long as the functions inlined in it are there.
 //!
 //! The code is in memory that is either writable or executable, never both. It is given back when the
 //! [`MachineCode`] is dropped: whoever keeps it must not drop it while it runs.

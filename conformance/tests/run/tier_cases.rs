@@ -27,7 +27,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 ";
 
 /// Name and text of each.
-const CASES: [(&str, &str); 16] = [
+const CASES: [(&str, &str); 17] = [
     (
         "functions redefined while they run",
         "(defun step-of (x) (+ x 1))
@@ -302,6 +302,28 @@ const CASES: [(&str, &str); 16] = [
          (dotimes (i 5) (print (handler-case (set-constant 1.0) (error (e) (type-of e)))))
          (defun deep (n) (if (= n 0) (list *x* *y*) (let ((*x* (+ *x* 1.0)) (*y* n)) (deep (- n 1)))))
          (print (deep 100)) (print (deep 2000)) (print (list *x* *y* *z*))",
+    ),
+    (
+        "functions that call themselves",
+        "(defun fib (n) (if (< n 2) n (+ (fib (- n 1)) (fib (- n 2)))))
+         (print (list (fib 15) (fib 15.5) (fib 16)))
+         (defun halves (x n) (if (= n 0) x (let ((y (* x 0.5))) (+ y (halves (+ y 0.25) (- n 1)) y))))
+         (print (list (halves 1.0 10) (halves 3 10) (halves 1.0e300 40) (halves 1/3 5)))
+         (defun deep (n) (if (= n 0) 0 (+ 1 (deep (- n 1)))))
+         (print (list (deep 10) (deep 3000) (deep 100000)))
+         (print (handler-case (deep -1) (serious-condition (e) (type-of e))))
+         (defun lost (n) (if (= n 0) (car 5) (+ 1 (lost (- n 1)))))
+         (dotimes (i 40) (handler-case (lost i) (type-error (e) (print (type-error-datum e)))))
+         (defun sums (n) (if (< n 1) (values 0 0) (multiple-value-bind (a b) (sums (- n 1)) (values (+ a n) b))))
+         (print (multiple-value-list (sums 200)))
+         (defun new-self (n)
+           (when (= n 30) (setf (symbol-function 'new-self) (lambda (n) (list :new n))))
+           (if (< n 1) (list n) (cons n (new-self (- n 1)))))
+         (print (new-self 60)) (print (new-self 3))
+         (defun counter (step)
+           (labels ((count-down (n sum) (if (<= n 0) sum (+ step (count-down (- n step) (+ sum 0.5))))))
+             #'count-down))
+         (print (list (funcall (counter 2) 300 1) (funcall (counter 0.5) 100 1) (handler-case (funcall (counter 3) 30 'a) (error (e) (type-of e)))))",
     ),
     (
         "builtins called as functions",

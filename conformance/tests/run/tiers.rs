@@ -212,6 +212,9 @@ impl RandomNumbers {
         for number in 0..SMALL {
             let _ = writeln!(text, "(defun g{number} (a b) {})", self.small(number));
         }
+        let (x, y, z, value) = (self.leaf(), self.leaf(), self.leaf(), self.small(SMALL));
+        let _ = writeln!(text, "(defun r (a b n) (if (< n 1) {x} (tame (- (r {y} {value} (- n 1)) {z}))))");
+        let _ = writeln!(text, "(defun q (a n) (if (< n 2) {x} (+ (q a (- n 1)) (* 0.5 (q {y} (- n 2))))))");
         for number in 1..=4 {
             let _ = writeln!(text, "(defun f{number} (a b)");
             let before = number - 1;
@@ -295,13 +298,15 @@ impl RandomNumbers {
             10 => format!("(logand (floor {x}) 255)"),
             11 => format!("(f0 {x} {y})"),
             12 => format!("(o0 {x})"),
-            13 => match self.below(9) {
+            13 => match self.below(12) {
                 0 => format!("(o1 {x} {y} 3)"),
                 1 => format!("(o1 {x})"),
                 2 => format!("(o2 :of {x} :by {y})"),
                 3 => format!("(o3 {x} {y})"),
                 4 => format!("(o3 {x})"),
                 5 | 6 => format!("(o4 #'{} {x} {y})", self.callee()),
+                9 | 10 => format!("(r {x} {y} {})", self.below(8)),
+                11 => format!("(q {x} {})", self.below(6)),
                 7 => format!("(car (o5 #'{} {x} {y}))", self.callee()),
                 _ => format!("(o0 {x} {y})"),
             },
