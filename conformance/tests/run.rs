@@ -16,6 +16,9 @@ use esl_conformance::{Expectations, Setting, programs};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 #[cfg(feature = "native")]
+#[path = "run/tier_calls.rs"]
+mod tier_calls;
+#[cfg(feature = "native")]
 #[path = "run/tier_cases.rs"]
 mod tier_cases;
 #[cfg(feature = "native")]

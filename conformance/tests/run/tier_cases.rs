@@ -1,5 +1,5 @@
-//! Programs that are bad for a tier of machine code: functions that change while they run as such, code that
-//! piles up, code that is too long, recursion that is too deep, numbers that leave their kind in a loop.
+//! Programs that are bad for a tier of machine code: code that piles up, code that is too long, numbers that
+//! leave their kind in a loop; those about calls are in `tier_calls`.
 
 use std::process::Command;
 
@@ -9,6 +9,7 @@ use esl::program::{self, Program, Source};
 use esl_vm::vm::Tier;
 use libtest_mimic::{Failed, Trial};
 
+use super::tier_calls::CALLS;
 use super::tiers::{compare, run_anyhow};
 
 /// The test that runs in a process of its own, since what it asks of the system lasts as long as the process.
@@ -27,151 +28,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 ";
 
 /// Name and text of each.
-const CASES: [(&str, &str); 17] = [
-    (
-        "functions redefined while they run",
-        "(defun step-of (x) (+ x 1))
-         (defun walk (n)
-           (let ((sum 0))
-             (dotimes (i n)
-               (setq sum (+ sum (step-of i)))
-               (when (= i 300) (setf (symbol-function 'step-of) (lambda (x) (+ x 2.5))))
-               (when (= i 600) (setf (symbol-function 'step-of) (lambda (x &optional y) (list x y) 3)))
-               (when (= i 700) (setf (symbol-function 'walk) (lambda (n) (list :other n)))))
-             sum))
-         (print (walk 100)) (print (walk 1000)) (print (walk 5))
-         (defun again (n)
-           (when (= n 40) (setf (symbol-function 'again) (lambda (n) (list :new n))))
-           (if (= n 0) :old (again (- n 1))))
-         (print (again 100)) (print (again 3))",
-    ),
-    (
-        "small functions within each other",
-        "(defun id (x) x)
-         (defun both (x) (values x (list x)))
-         (defun none () (values))
-         (defun tail (x y) (list y x))
-         (defun third-of (x) (floor x 3))
-         (defun in-place (x) (third-of (+ x 1)))
-         (defun given (f x) (funcall f x))
-         (defun two (x y) (+ (id x) (id y)))
-         (defun four (x y) (* (two x 0.5) (two (id y) x)))
-         (defun eight (x y) (- (four x y) (four y x)))
-         (defun looked-up (table x) (gethash x table :none))
-         (defun closed (f) (funcall f))
-         (defun failing (x) (if (= x 77) (error \"no ~a\" x) (- x 0.5)))
-         (let ((count 0)) (defun counted (x) (incf count x) count))
-         (defvar *level* 0.5)
-         (defun bound (x) (let ((*level* (+ *level* x))) (two *level* x)))
-         (defun even-p (n) (if (= n 0) t (odd-p (- n 1))))
-         (defun odd-p (n) (if (= n 0) nil (even-p (- n 1))))
-         (defun run (n)
-           (let ((sum 0.0) (seen nil) (table (make-hash-table)))
-             (setf (gethash 3 table) 0.25)
-             (dotimes (i n)
-               (setq sum (+ (* sum 0.5) (eight sum i) (in-place i) (bound 0.25)))
-               (setq seen (tail (both (none)) (given #'id (looked-up table i))))
-               (setq sum (+ (handler-case (failing i) (error () (* sum 0.25))) (id (counted 1)) (* sum 0.001)))
-               (when (even-p (mod i 9)) (setq seen (cons (closed (lambda () sum)) (id seen))))
-               (when (< 1.0e200 sum) (setq sum 1.0)))
-             (list sum seen)))
-         (print (run 3)) (print (run 200)) (print (multiple-value-list (both 1)))",
-    ),
-    (
-        "calls with arguments that are put in order",
-        "(defun opt (a &optional (b 0.5) c) (list a b c))
-         (defun rest-of (a &rest others) (if others (list a others) a))
-         (defun keys (a &key (b (* a 0.5)) ((:d c) 7 c-p) &allow-other-keys) (list a b c c-p))
-         (defun strict (&key x) x)
-         (defun tail-opt (a) (opt a))
-         (defun tail-rest (a b c) (rest-of a b c))
-         (defun tail-keys (a b) (keys (* a 1.5) :d b :d 9))
-         (defun given (f x) (funcall f x x))
-         (defun deep (n &optional (x 0.5)) (if (= n 0) x (+ 0.25 (deep (- n 1) (* x 1.0)))))
-         (defun run (n)
-           (let ((sum 0.0) (seen nil))
-             (dotimes (i n)
-               (setq sum (+ (* sum 0.5) (second (opt i)) (rest-of (* sum 0.25))))
-               (setq seen (list (opt i sum) (opt i sum nil) (rest-of i sum seen) (keys sum) (keys i :b sum)
-                                (keys i :e 3 :d sum) (tail-opt sum) (tail-rest i sum i) (tail-keys sum i)
-                                (given #'opt sum) (given #'rest-of i) (strict) (strict :x sum)))
-               (setq seen (list i (equal seen (copy-tree seen)) (nth (mod i 13) seen)))
-               (when (= 0 (mod i 40))
-                 (setq seen (list (handler-case (opt) (error (e) (type-of e)))
-                                  (handler-case (opt 1 2 3 4) (error (e) (type-of e)))
-                                  (handler-case (strict :y sum) (error (e) (type-of e)))
-                                  (handler-case (strict :x) (error (e) (type-of e)))
-                                  (apply #'rest-of (make-list 30 :initial-element sum))))))
-             (list sum seen)))
-         (dotimes (i 45) (print (run i))) (print (run 300)) (print (deep 3000))
-         (defun many (&rest all) (length all))
-         (defun long (n) (let ((sum 0)) (dotimes (i n) (incf sum (many i i i i i i i i i i i i i i i i i i i i)))
-                              sum))
-         (print (long 100))",
-    ),
-    (
-        "calls that want other numbers of values than one",
-        "(defun one (x) (* x 0.5))
-         (defun none () (values))
-         (defun three (x) (values x (* x 2.0) (list x)))
-         (defun floored (x) (floor x 0.75))
-         (defun pass-on (x) (three (one x)))
-         (defun through (n x) (if (= n 0) (three x) (through (- n 1) (* x 1.0))))
-         (defun protected (f x) (unwind-protect (funcall f x) (one x)))
-         (defvar *level* 0)
-         (defun bound (x) (let ((*level* (+ *level* 1))) (three x)))
-         (defun self (n) (if (= n 0) (values 1 2) (multiple-value-bind (a b) (self (- n 1)) (values b (+ a n)))))
-         (defun run (n)
-           (let ((sum 0.0) (seen nil))
-             (dotimes (i n)
-               (multiple-value-bind (a b c d) (three sum)
-                 (multiple-value-bind (q r) (floored (+ a i))
-                   (setq sum (+ (* sum 0.25) b (car c) q r) seen d)))
-               (setq seen (list (multiple-value-list (one sum)) (multiple-value-list (none))
-                                (multiple-value-list (pass-on i)) (multiple-value-list (through 5 sum))
-                                (multiple-value-list (protected #'three sum))
-                                (multiple-value-list (protected #'one i)) (multiple-value-list (bound sum))
-                                (multiple-value-list (self (mod i 7))) (multiple-value-list (protected #'floor i))
-                                (multiple-value-call #'list (one sum) (three i) (none) (one 2))
-                                (multiple-value-bind (a b) (none) (list a b))
-                                (multiple-value-bind (a b c) (one sum) (list a b c))
-                                (multiple-value-prog1 (one sum) (three sum)) *level*))
-               (when (> sum 1.0e100) (setq sum 0.5)))
-             (list sum seen)))
-         (dotimes (i 40) (print (run i))) (print (run 400))",
-    ),
-    (
-        "small functions of which one fails, sleeps, or is collected",
-        "(defun nap (x) (sleep 1) x)
-         (defun inner (x) (+ x 0.5 (nap 0.25)))
-         (defun middle (x) (* 2.0 (inner (* x 0.5))))
-         (defun outer (n) (let ((sum 0.0)) (dotimes (i n) (setq sum (+ sum (middle i)))) sum))
-         (print (outer 40))
-         (print (mapcar #'wait-for-task (list (spawn (outer 7)) (spawn (outer 9)))))
-         (defun vector-of (x) (vector x (* x 2.0)))
-         (defun first-of (v) (svref v 0))
-         (defun kept (n)
-           (let ((last nil) (sum 0.0))
-             (dotimes (i n)
-               (let ((v (vector-of (+ sum 0.5)))) (setq sum (first-of v) last v)))
-             (list sum last)))
-         (print (kept 2000))
-         (defun small (x) (+ x 1))
-         (defun caller (n) (let ((sum 0)) (dotimes (i n) (setq sum (small sum))) sum))
-         (print (caller 50))
-         (dotimes (i 30)
-           (eval `(defun small (x) (+ x ,i)))
-           (make-array 30000)
-           (print (caller 50)))
-         (print (handler-case (progn (fmakunbound 'small) (caller 3)) (error (e) (type-of e))))",
-    ),
-    (
-        "recursion deeper than the frames of one entry",
-        "(defun deep (n x) (if (= n 0) x (+ 0.5 (deep (- n 1) (* x 1.0)))))
-         (print (deep 20000 1.0)) (print (deep 20000 2))
-         (defun endless (x) (+ 1.5 (endless (+ x 1.5))))
-         (print (handler-case (endless 0.0) (error (e) (type-of e))))",
-    ),
+const CASES: [(&str, &str); 9] = [
     (
         "doubles that become something else in a loop",
         "(defun run (x y n)
@@ -304,60 +161,6 @@ const CASES: [(&str, &str); 17] = [
          (print (deep 100)) (print (deep 2000)) (print (list *x* *y* *z*))",
     ),
     (
-        "functions that call themselves",
-        "(defun fib (n) (if (< n 2) n (+ (fib (- n 1)) (fib (- n 2)))))
-         (print (list (fib 15) (fib 15.5) (fib 16)))
-         (defun halves (x n) (if (= n 0) x (let ((y (* x 0.5))) (+ y (halves (+ y 0.25) (- n 1)) y))))
-         (print (list (halves 1.0 10) (halves 3 10) (halves 1.0e300 40) (halves 1/3 5)))
-         (defun deep (n) (if (= n 0) 0 (+ 1 (deep (- n 1)))))
-         (print (list (deep 10) (deep 3000) (deep 100000)))
-         (print (handler-case (deep -1) (serious-condition (e) (type-of e))))
-         (defun lost (n) (if (= n 0) (car 5) (+ 1 (lost (- n 1)))))
-         (dotimes (i 40) (handler-case (lost i) (type-error (e) (print (type-error-datum e)))))
-         (defun sums (n) (if (< n 1) (values 0 0) (multiple-value-bind (a b) (sums (- n 1)) (values (+ a n) b))))
-         (print (multiple-value-list (sums 200)))
-         (defun new-self (n)
-           (when (= n 30) (setf (symbol-function 'new-self) (lambda (n) (list :new n))))
-           (if (< n 1) (list n) (cons n (new-self (- n 1)))))
-         (print (new-self 60)) (print (new-self 3))
-         (defun counter (step)
-           (labels ((count-down (n sum) (if (<= n 0) sum (+ step (count-down (- n step) (+ sum 0.5))))))
-             #'count-down))
-         (print (list (funcall (counter 2) 300 1) (funcall (counter 0.5) 100 1) (handler-case (funcall (counter 3) 30 'a) (error (e) (type-of e)))))",
-    ),
-    (
-        "builtins called as functions",
-        "(defun one (f x) (+ 0.5 (funcall f x 3)))
-         (defun several (f x) (multiple-value-bind (a b c) (funcall f x 3) (list a b c)))
-         (defun all (f x) (multiple-value-call #'list (funcall f x 3) (funcall f 3 x)))
-         (defun tail (f x) (funcall f x 3))
-         (defun call-through (f x) (let ((y (* x 1.5))) (list (tail f x) y)))
-         (defun second-of (f x) (nth-value 1 (tail f x)))
-         (defun calls (g f n)
-           (let ((sum 0) (last nil))
-             (dotimes (i n)
-               (setq last (funcall g f i))
-               (when (numberp last) (setq sum (+ sum last))))
-             (list sum last)))
-         (dolist (f (list #'+ #'floor #'list #'values #'cons #'funcall #'gethash #'1+ #'equal #'max
-                          (lambda (x y) (values y x))))
-           (dolist (g (list #'one #'several #'all #'tail #'call-through #'second-of))
-             (print (handler-case (calls g f 200) (error (e) (type-of e))))))
-         (defun on-long (f x y n) (let ((last nil)) (dotimes (i n) (setq last (funcall f x y))) last))
-         (defun on-long-in-place (f x y) (funcall f x y))
-         (let ((x (make-list 30000 :initial-element 1)) (y (make-list 30000 :initial-element 1)))
-           (print (on-long #'equal x y 40))
-           (dotimes (i 40) (on-long-in-place #'equal x y))
-           (print (on-long-in-place #'equal x y))
-           (print (let ((*print-length* 3)) (prin1-to-string (on-long #'append x y 5)))))
-         (defun last-of (f n) (let ((list nil)) (dotimes (i n (car list)) (setq list (funcall f i list)))))
-         (print (last-of #'cons 20000))
-         (defun ends (f n) (dotimes (i n) (funcall f i)) :end)
-         (print (ends #'identity 3000))
-         (print (handler-case (ends #'car 3000) (type-error (e) (type-error-datum e))))
-         (print (handler-case (ends #'error 300) (error (e) (type-of e))))",
-    ),
-    (
         "pairs of doubles and of other values",
         "(defun pairs (n)
            (let ((list nil) (x 1.0) (y 0.0))
@@ -386,7 +189,7 @@ const CASES: [(&str, &str); 17] = [
 
 /// Returns the tests.
 pub(super) fn trials() -> Vec<Trial> {
-    let cases = CASES.iter().map(|&(name, text)| {
+    let cases = CASES.iter().chain(&CALLS).map(|&(name, text)| {
         Trial::test(format!("tiers bad case: {name}"), move || {
             let program = compile(text)?;
             for slice in [2000, 50, 1] {
