@@ -215,8 +215,8 @@ impl<'a> NativeFlow<'a> {
         Some(step)
     }
 
-    /// Returns what an instruction of a frame calls, if that is inlined there: a small function that it names,
-    /// or the function itself, once.
+    /// Returns what an instruction of a frame calls, if that is inlined there: a small function that it
+    /// names, or the function itself, once.
     fn callee(&self, frame: usize, instr: &Instr, inlined: &'a [InlinedSource]) -> Option<InlinedCall<'a>> {
         let (window, count) = call_of(instr)?;
         let caller = &self.frames[frame];

@@ -33,20 +33,13 @@ pub(super) unsafe extern "C" fn call_other(
             return arranged.map_or(CALL_AGAIN, |(address, _)| address);
         }
         match call_builtin(context, pc, base, shape.number, FramePlace::Window) {
-            Ok(value) if word.c() == 0 => *window = value,
-            Ok(value) => {
-                let (vm, _) = parts(context);
-                vm.exchange.values.clear();
-                vm.exchange.values.push(value);
-                substitute::deliver(vm, window, word.c());
-            }
-            Err(CALL_VALUES) => {
+            Ok(_) | Err(CALL_VALUES) => {
                 let (vm, _) = parts(context);
                 substitute::deliver(vm, window, word.c());
+                CALL_DONE
             }
-            Err(outcome) => return outcome,
+            Err(outcome) => outcome,
         }
-        CALL_DONE
     }
 }
 
@@ -108,7 +101,8 @@ unsafe fn arrange(
     }
 }
 
-/// Takes the tick of a call of a builtin, and calls it. Returns its value.
+/// Takes the tick of a call of a builtin, and calls it. Returns its value, which is the value list too, as
+/// where the loop calls it: what the list holds is kept by the collector.
 ///
 /// # Errors
 /// What is to be said of the call if that is another outcome.
@@ -136,7 +130,12 @@ unsafe fn call_builtin(
         vm.cpu.set_base(base);
         let result = apply_native(vm, number, arguments);
         match result {
-            Ok(_) | Err(Exit::Values) => attend(context, vm),
+            Ok(value) => {
+                vm.exchange.values.clear();
+                vm.exchange.values.push(value);
+                attend(context, vm);
+            }
+            Err(Exit::Values) => attend(context, vm),
             Err(exit) => {
                 let signal = call_instead(vm, exit, number, arguments, place);
                 let (pc, base) = (vm.cpu.pc(), vm.cpu.base());
