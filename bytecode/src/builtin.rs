@@ -1217,6 +1217,10 @@ macro_rules! for_each_builtin {
             /// those that it has.
             StringInputPosition = stream::string_input_position,
                 internal "%STRING-INPUT-POSITION" ("stream &optional as-rest");
+            /// Has such a stream, if it is open and of a string, go on after so many of its characters, or at
+            /// the end with `NIL`. Whether it does.
+            SetStringInputPosition = stream::set_string_input_position,
+                internal "%SET-STRING-INPUT-POSITION" ("stream position");
             /// A stream that gathers what is written to it.
             MakeStringOutput = stream::make_string_output, internal "%MAKE-STRING-OUTPUT" ("");
             /// What a string stream has gathered since this was last asked.

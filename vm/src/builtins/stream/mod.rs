@@ -36,7 +36,7 @@ pub(super) use file::{delete_file, file_bytes, file_error, file_exists_p, file_t
 pub(super) use read::{listen, peek_char, read_char, read_char_no_hang, read_line, unread_char};
 pub(super) use text::{
     gathered_length, get_output_stream_string, make_string_input, make_string_output, read_from_copy,
-    string_input_position, take_gathered,
+    set_string_input_position, string_input_position, take_gathered,
 };
 pub(super) use write::{finish_output, fresh_line, terpri, write_char, write_string};
 

@@ -45,6 +45,19 @@ pub(in crate::builtins) fn string_input_position(vm: &mut Vm, arguments: &[Value
     Ok(Value::index(before + position))
 }
 
+pub(in crate::builtins) fn set_string_input_position(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, kind) = designated_stream(vm, arguments[0], true)?;
+    let end = stream_index(&vm.heap, stream, slot::END);
+    let position = if arguments[1].is_true() { arguments[1].as_index() } else { Some(end) };
+    match position {
+        Some(position) if kind == StreamKind::StringInput && position <= end => {
+            set_stream_slot(&mut vm.heap, stream, slot::POSITION, Value::index(position));
+            Ok(Value::T)
+        }
+        _ => Ok(Value::NIL),
+    }
+}
+
 pub(in crate::builtins) fn make_string_output(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
     Ok(make_stream(&mut vm.heap, StreamKind::StringOutput, buffer, 0, 0)?)
