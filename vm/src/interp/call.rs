@@ -10,13 +10,16 @@ use esl_bytecode::word::Word;
 
 use super::arguments::{arrange, count_of_arguments, describe_arity, spread};
 use super::substitute::{deliver, return_all, substitute};
-use super::{Signal, aux_at, code_of, constant, first_instruction, pc_as_value, stubs, word_at};
+use super::{Signal, aux_at, code_of, constant, failure, first_instruction, pc_as_value, stubs, word_at};
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::Arguments;
 use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
 use crate::vm::Vm;
+
+/// Most calls that builtins request in the place of each other: each copies its arguments.
+const MAX_REQUESTED: usize = 64;
 
 /// Where a call puts its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,7 +153,24 @@ pub(super) unsafe fn call(
 /// The contract of [`call`].
 unsafe fn call_native(vm: &mut Vm, number: u16, arguments: *const [Value], place: FramePlace) -> Signal {
     // SAFETY: the contract is the same.
-    match unsafe { apply_native(vm, number, arguments) } {
+    unsafe {
+        let result = apply_native(vm, number, arguments);
+        end_native(vm, result, number, arguments, place)
+    }
+}
+
+/// Delivers what a builtin has come to that was called as a function.
+///
+/// # Safety
+/// The contract of [`call`], for the arguments of the builtin, which has left `vm.cpu` as it was.
+unsafe fn end_native(
+    vm: &mut Vm,
+    result: Result<Value, Exit>,
+    number: u16,
+    arguments: *const [Value],
+    place: FramePlace,
+) -> Signal {
+    match result {
         Ok(value) => {
             vm.exchange.values.clear();
             vm.exchange.values.push(value);
@@ -222,14 +242,40 @@ pub(super) unsafe fn call_instead(
             Ok(function) => unsafe { call(vm, function, arguments, place) },
             Err(exit) => Signal::Exit(exit),
         },
-        Exit::Call => {
-            let (function, arguments) = vm.exchange.take_requested_call();
-            // SAFETY: the contract still holds. A builtin that asks for itself would go on for ever, and none
-            // does.
-            unsafe { call(vm, function, &*arguments, place) }
-        }
+        // SAFETY: the contract still holds; what was requested owns its arguments.
+        Exit::Call => unsafe { call_requested(vm, place) },
         exit => Signal::Exit(exit),
     }
+}
+
+/// Makes the call that a builtin has requested. A builtin that is called so may request one itself, which is
+/// made here too, lest such calls take native stack.
+///
+/// # Safety
+/// The contract of [`call`]; a call was requested.
+pub(super) unsafe fn call_requested(vm: &mut Vm, place: FramePlace) -> Signal {
+    for _ in 0..MAX_REQUESTED {
+        let (callee, arguments) = vm.exchange.take_requested_call();
+        let function = match vm.callable(callee) {
+            Ok(function) => function,
+            Err(exit) => return Signal::Exit(exit),
+        };
+        // SAFETY: `callable` returns a Function. The arguments are there until the call is made; the contract
+        // of `call` holds.
+        unsafe {
+            let shape = Shape::unpack((*code_of(function)).spare[0]);
+            if shape.sort != Sort::Native {
+                return call(vm, function, &*arguments, place);
+            }
+            match apply_native(vm, shape.number, &*arguments) {
+                Err(Exit::Call) => vm.exchange.charge(arguments.len()),
+                result => return end_native(vm, result, shape.number, &*arguments, place),
+            }
+        }
+    }
+    vm.exchange.take_requested_call();
+    let text = format!("FUNCALL and APPLY are called within each other more than {MAX_REQUESTED} times");
+    failure(vm, Raised::Program(text))
 }
 
 impl Vm {

@@ -4,7 +4,7 @@
 
 use esl_bytecode::builtin::BUILTINS;
 
-use super::call::{FramePlace, call};
+use super::call::{FramePlace, call, call_requested};
 use super::{Signal, aux_at, failure, word_at};
 use crate::describe::describe;
 use crate::host::Host;
@@ -32,9 +32,8 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
             Exit::Unwind => Signal::Unwind,
             Exit::Slowly => take_over(vm),
             Exit::Call => {
-                let (function, arguments) = vm.exchange.take_requested_call();
                 let place = FramePlace::for_instruction(word_at(vm.cpu.pc()));
-                call(vm, function, &*arguments, place)
+                call_requested(vm, place)
             }
             Exit::Park => Signal::Park,
             Exit::Again => Signal::Again,

@@ -21,8 +21,8 @@ use crate::vm::Vm;
 /// Most bytes of machine code of one machine.
 const MOST_BYTES: usize = 32 << 20;
 
-/// Most bytes of machine code, as a part of what the machine's heap may have.
-const MOST_OF_HEAP: usize = 8;
+/// What part of the memory of the heap machine code may have at most: one in so many.
+const PART_OF_HEAP: usize = 8;
 
 /// Most orders that are given and not answered.
 const MOST_ORDERS: usize = 64;
@@ -54,7 +54,7 @@ pub(in crate::interp) unsafe fn make_at_entry(vm: &mut Vm, base: *mut Value) {
 /// # Safety
 /// `code` points to a Code of bytecode.
 pub(super) unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known>) {
-    let most = MOST_BYTES.min(vm.config.memory / MOST_OF_HEAP);
+    let most = MOST_BYTES.min(vm.config.memory / PART_OF_HEAP);
     let compiled = &mut vm.compiled;
     if compiled.report.refused.is_some() || compiled.report.bytes > most {
         return;
