@@ -159,9 +159,9 @@ impl Handle {
         &self,
         function: FunctionRef,
         arguments: impl IntoIterator<Item = Data>,
-        is_urgent: bool,
+        goes_first: bool,
     ) -> Reply<T> {
-        let question = Question::Call { function, arguments: data(arguments), is_urgent };
+        let question = Question::Call { function, arguments: data(arguments), goes_first };
         Reply::of_value(self.sender.ask(question))
     }
 }

@@ -52,7 +52,7 @@ impl Engine {
     pub fn begin(&mut self, text: &str) -> Reply<Data> {
         let text = Datum::string(text, Default::default());
         let function = FunctionRef::Named("ESL::%EVAL-TEXT".into());
-        let question = Question::Call { function, arguments: vec![text], is_urgent: false };
+        let question = Question::Call { function, arguments: vec![text], goes_first: false };
         Reply::of_value(Sender::new(&self.machine.inbox()).ask(question))
     }
 

@@ -270,7 +270,7 @@ fn incoming(out: &mut ByteWriter, incoming: &Incoming) {
             out.list(arguments, ByteWriter::datum);
         }
         Incoming::Question { number, question } => match question {
-            Question::Call { function, arguments, is_urgent } => {
+            Question::Call { function, arguments, goes_first } => {
                 out.byte(arrival::CALL);
                 out.number(*number);
                 match function {
@@ -284,7 +284,7 @@ fn incoming(out: &mut ByteWriter, incoming: &Incoming) {
                     }
                 }
                 out.list(arguments, ByteWriter::datum);
-                out.byte((*is_urgent).into());
+                out.byte((*goes_first).into());
             }
             Question::Tasks => {
                 out.byte(arrival::TASKS);
@@ -443,8 +443,8 @@ fn read_incoming(from: &mut ByteReader<'_>) -> Option<Incoming> {
                 1 => FunctionRef::Kept(from.number()?),
                 _ => return None,
             };
-            let (arguments, is_urgent) = (from.list(ByteReader::datum)?, from.flag()?);
-            Incoming::Question { number, question: Question::Call { function, arguments, is_urgent } }
+            let (arguments, goes_first) = (from.list(ByteReader::datum)?, from.flag()?);
+            Incoming::Question { number, question: Question::Call { function, arguments, goes_first } }
         }
         arrival::TASKS => Incoming::Question { number: from.number()?, question: Question::Tasks },
         arrival::ABORT => Incoming::Abort(from.number()?),

@@ -112,7 +112,7 @@ fn data() -> Vec<Datum> {
 /// A record of every kind.
 fn records() -> Vec<NotedRecord> {
     let failure = || HostFailure { cause: "LOST".into(), arguments: data() };
-    let call = |function| Question::Call { function, arguments: data(), is_urgent: true };
+    let call = |function| Question::Call { function, arguments: data(), goes_first: true };
     let incoming = vec![
         Incoming::Signal(ProcessSignal::Terminate),
         Incoming::Stop,

@@ -65,6 +65,62 @@ fn a_handle_calls_asserts_and_sets_in_order() {
     assert_eq!(thread.join().expect("it does not panic"), Ok((true, true, true, 1, 6)));
 }
 
+/// Each change takes many slices, beside busy tasks.
+#[test]
+fn what_comes_after_a_change_finds_it_made() {
+    let host = RealHost::new(Vec::new());
+    let config = Config { slice: 200, ..Config::default() };
+    let mut engine = Engine::with(config, Box::new(host)).expect("there is room for the library");
+    let definitions = "(progn (define-input seen :capacity 99) (define-property path ())
+                              (defun newest () (first (path)))
+                              (defun number-of-items () (length (db-query '(item ?i))))
+                              (dotimes (i 20000) (assert (list 'item i)))
+                              (dotimes (i 5) (spawn (loop))))";
+    check(&mut engine, definitions, "NIL");
+    let handle = engine.handle();
+    let thread = std::thread::spawn(move || {
+        let item = [Data::Symbol("ITEM".into()), Data::Symbol("?I".into())];
+        let gone = handle.retract(Data::list(item));
+        handle.signal("seen", [])?;
+        let path = |n: i64| Data::list((0..8_000).map(|_| Data::from(n)));
+        let newest: Vec<_> = (0..20)
+            .map(|n| {
+                drop(handle.set("path", [], path(n - 1)));
+                drop(handle.set("path", [], path(n)));
+                handle.call::<i64>("newest", [])
+            })
+            .collect();
+        let newest: Vec<_> = newest.into_iter().map(|reply| reply.wait()).collect();
+        handle.signal("seen", [])?;
+        Ok::<_, SendError>((gone.wait(), newest))
+    });
+    check(&mut engine, "(progn (wait-for-event seen) (number-of-items))", "0");
+    check(&mut engine, "(progn (wait-for-event seen) (newest))", "19");
+    let (gone, newest) = thread.join().expect("it does not panic").expect("there is the input");
+    assert_eq!(gone, Ok(20_000));
+    assert!(
+        newest.iter().zip(0..).all(|(seen, set)| seen.as_ref().is_ok_and(|&seen| seen >= set)),
+        "{newest:?}"
+    );
+}
+
+#[test]
+fn a_call_that_waits_for_a_change_can_be_aborted() {
+    let mut engine = engine();
+    let definitions = "(progn (defvar *calls* 0) (defun note () (incf *calls*))
+                              (dotimes (i 20000) (assert (list 'item i))))";
+    check(&mut engine, definitions, "NIL");
+    let handle = engine.handle();
+    let item = [Data::Symbol("ITEM".into()), Data::Symbol("?I".into())];
+    let gone = handle.retract(Data::list(item));
+    let (kept, aborted) = (handle.spawn("note", []), handle.spawn("note", []));
+    aborted.abort();
+    check(&mut engine, "(loop until (plusp *calls*) do (sleep 0.001))", "NIL");
+    check(&mut engine, "(progn (sleep 0.05) *calls*)", "1");
+    assert_eq!((gone.wait(), aborted.wait()), (Ok(20_000), Err(Error::Aborted)));
+    assert_eq!(kept.wait(), Ok(Data::Integer(1)));
+}
+
 #[test]
 fn what_goes_wrong_with_a_question_is_an_error_of_the_answer() {
     let mut engine = engine();

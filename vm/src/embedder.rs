@@ -1,11 +1,11 @@
 //! Values that the embedder holds, and its requests.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use esl_bytecode::compile::SourcePlace;
 
 use crate::heap::Heap;
-use crate::host::ProcessSignal;
+use crate::host::{Incoming, ProcessSignal};
 use crate::task::{TaskId, TaskIndex};
 use crate::value::Value;
 
@@ -16,6 +16,10 @@ pub(crate) struct Embedder {
     pub(crate) pinned: Vec<Value>,
     /// Numbers of the questions from outside for which tasks run, by the places of these.
     pub(crate) calls: BTreeMap<TaskIndex, u64>,
+    /// The call from outside that goes first, while what has come after it is deferred.
+    pub(crate) first: Option<TaskId>,
+    /// What is deferred, in the order in which it has come.
+    pub(crate) deferred: VecDeque<Incoming>,
     /// Values that the outside holds, by number.
     pub(crate) kept: BTreeMap<u64, Value>,
     /// Number of values kept so far.

@@ -15,7 +15,7 @@
 //! * `process`: belongs to the process: an address, a handle, a setting of those who watch.
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::package::{PackageId, Packages};
@@ -26,6 +26,7 @@ use esl_heap::state::{StateSink, Stated};
 use crate::compiler::Compilations;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
+use crate::host::Incoming;
 use crate::observe::{Figures, Journal, Observers, Watch};
 use crate::outside::{Operations, Outside};
 use crate::schedule::{Accounts, Clock, Counts, EndOfAll, Points, RunQueues, Scheduler, Timers, Turn};
@@ -200,6 +201,11 @@ fn tell_opaques(opaques: &Opaques, sink: &mut dyn StateSink) {
     (opaques.made, opaques.len()).tell(sink);
 }
 
+fn tell_deferred(deferred: &VecDeque<Incoming>, sink: &mut dyn StateSink) {
+    deferred.len().tell(sink);
+    deferred.iter().for_each(|incoming| format!("{incoming:?}").tell(sink));
+}
+
 fn tell_place(place: &Option<SourcePlace>, sink: &mut dyn StateSink) {
     if let Some(SourcePlace { source, line, column }) = place {
         source.tell(sink);
@@ -238,6 +244,8 @@ list_state! { Exchange {
 list_state! { Embedder {
     pinned: Run,
     calls: Run,
+    first: Run,
+    deferred: Run by tell_deferred,
     handlers: Run,
     kept: Run,
     kept_so_far: Run,

@@ -411,5 +411,5 @@ fn rights_of(arguments: &[WireForm]) -> Option<Datum> {
 
 fn call(function: &str, arguments: Vec<Datum>) -> Question {
     let function = FunctionRef::Named(format!("ESL::{function}"));
-    Question::Call { function, arguments, is_urgent: false }
+    Question::Call { function, arguments, goes_first: false }
 }

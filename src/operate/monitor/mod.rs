@@ -316,7 +316,7 @@ async fn act(monitor: &MonitorState, deed: MonitorDeed) -> Result<(), OperatorRe
 /// Its failure, or that it was not done.
 async fn call(sender: &Sender, function: &str, arguments: Vec<Datum>) -> Result<(), OperatorRefusal> {
     let function = FunctionRef::Named(format!("ESL::{function}"));
-    let pending = sender.ask(Question::Call { function, arguments, is_urgent: true });
+    let pending = sender.ask(Question::Call { function, arguments, goes_first: true });
     match tokio::time::timeout(5 * PATIENCE, pending).await {
         Ok(Answer::Values(_)) => Ok(()),
         Ok(Answer::Failed { message, .. }) => Err(OperatorRefusal::Failed(message)),

@@ -66,8 +66,9 @@ pub enum Question {
         function: FunctionRef,
         /// The arguments.
         arguments: Vec<Datum>,
-        /// Whether the task has its first turn before those that can run already.
-        is_urgent: bool,
+        /// Whether the task has its turns before the others, and calls and messages that come later are
+        /// deferred until it has ended, or waits.
+        goes_first: bool,
     },
     /// Which tasks there are.
     Tasks,

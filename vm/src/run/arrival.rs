@@ -8,7 +8,7 @@ use super::question::{abort_call, abort_task, release, take_question};
 use super::signal::signal;
 use super::spawn::{SpawnOptions, make_task};
 use super::wake::make_runnable;
-use crate::host::{Awaited, Host, Incoming, Look, ProcessSignal, Wake};
+use crate::host::{Awaited, Host, Incoming, Look, ProcessSignal, Question, Wake};
 use crate::task::{TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -19,29 +19,66 @@ use crate::vm::Vm;
 pub(crate) fn take_in(vm: &mut Vm) -> bool {
     let mut stops = false;
     for incoming in vm.outside.host.poll(vm.scheduler.rounds) {
-        match incoming {
-            Incoming::Signal(signal) => stops |= end_by_signal(vm, signal),
-            Incoming::Stop => stops = true,
-            Incoming::Input => wake_readers(vm),
-            Incoming::Output => wake_writers(vm),
-            Incoming::Operation { number, news } => hear(vm, number, news),
-            Incoming::Message { input, arguments } => receive(vm, &input, &arguments),
-            Incoming::Question { number, question } => take_question(vm, number, question),
-            Incoming::Abort(number) => abort_task(vm, TaskNumber(number)),
-            Incoming::AbortCall(number) => abort_call(vm, number),
-            Incoming::Pause(pauses) => vm.scheduler.is_paused = pauses && !vm.embedder.is_ending,
-            Incoming::Release(number) => release(vm, number),
-            Incoming::Watch => admit_observers(vm),
-            Incoming::SenderCame => vm.outside.senders += 1,
-            Incoming::SenderLeft => {
-                vm.outside.senders = vm.outside.senders.saturating_sub(1);
-                // Nobody is left who could end a pause.
-                vm.scheduler.is_paused &= vm.outside.senders > 0;
-            }
+        if vm.embedder.first.is_some() && is_deferrable(&incoming) {
+            vm.embedder.deferred.push_back(incoming);
+        } else {
+            stops |= take_in_one(vm, incoming);
         }
     }
     serve_looks(vm);
     stops
+}
+
+/// Returns whether something waits for a call that goes first: what a task of the program could tell from
+/// the order, and the values that such calls need. Whatever ends, pauses or lists tasks does not.
+fn is_deferrable(incoming: &Incoming) -> bool {
+    matches!(
+        incoming,
+        Incoming::Message { .. }
+            | Incoming::Question { question: Question::Call { .. }, .. }
+            | Incoming::Release(_)
+    )
+}
+
+/// Takes in what was deferred for a call that goes first, if that has ended or waits now.
+#[cold]
+pub(crate) fn take_in_deferred(vm: &mut Vm) {
+    if let Some(id) = vm.embedder.first
+        && vm.scheduler.tasks.get(id).is_some_and(|task| task.state == TaskState::Runnable)
+    {
+        return;
+    }
+    vm.embedder.first = None;
+    while vm.embedder.first.is_none()
+        && let Some(incoming) = vm.embedder.deferred.pop_front()
+    {
+        take_in_one(vm, incoming);
+    }
+}
+
+/// Takes in one thing. Returns whether the run is to come back to the embedder.
+fn take_in_one(vm: &mut Vm, incoming: Incoming) -> bool {
+    match incoming {
+        Incoming::Signal(signal) => return end_by_signal(vm, signal),
+        Incoming::Stop => return true,
+        Incoming::Input => wake_readers(vm),
+        Incoming::Output => wake_writers(vm),
+        Incoming::Operation { number, news } => hear(vm, number, news),
+        Incoming::Message { input, arguments } => receive(vm, &input, &arguments),
+        Incoming::Question { number, question } => take_question(vm, number, question),
+        Incoming::Abort(number) => abort_task(vm, TaskNumber(number)),
+        Incoming::AbortCall(number) => abort_call(vm, number),
+        Incoming::Pause(pauses) => vm.scheduler.is_paused = pauses && !vm.embedder.is_ending,
+        Incoming::Release(number) => release(vm, number),
+        Incoming::Watch => admit_observers(vm),
+        Incoming::SenderCame => vm.outside.senders += 1,
+        Incoming::SenderLeft => {
+            vm.outside.senders = vm.outside.senders.saturating_sub(1);
+            // Nobody is left who could end a pause.
+            vm.scheduler.is_paused &= vm.outside.senders > 0;
+        }
+    }
+    false
 }
 
 /// Waits in the host, and answers those who look at the run meanwhile.

@@ -36,7 +36,7 @@ mod turn;
 mod wake;
 
 pub(crate) use abort::abort_others;
-pub(crate) use arrival::{take_in, wait_in_host};
+pub(crate) use arrival::{take_in, take_in_deferred, wait_in_host};
 pub use call::{CallError, FailureArguments};
 pub(crate) use limit::{admit, expire_limit, go_on, open_limit, stand_still};
 pub(crate) use pending::interrupt_by;
@@ -162,6 +162,9 @@ fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> Run
         vm.scheduler.rounds += 1;
         if vm.scheduler.rounds.is_multiple_of(CHECK_ROUNDS) {
             tell_how_far(vm);
+        }
+        if vm.embedder.first.is_some() {
+            take_in_deferred(vm);
         }
         if vm.outside.inbox.is_rung() && take_in(vm) {
             return RunOutcome::Stopped;

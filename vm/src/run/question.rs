@@ -4,10 +4,11 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
 
 use super::finish::allocate_without_retry;
+use super::spawn::{SpawnOptions, spawn_kept};
 use crate::datum::{self, DatumError};
-use crate::host::{Answer, FunctionRef, Kept, Question, TaskInfo};
+use crate::host::{Answer, FunctionRef, Incoming, Kept, Question, TaskInfo};
 use crate::report;
-use crate::task::{Task, TaskEnd, TaskId, TaskNumber, TaskState};
+use crate::task::{DEFAULT_PRIORITY, HIGHEST_PRIORITY, Task, TaskEnd, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -25,15 +26,16 @@ pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
         }
         // What ends begins nothing new.
         Question::Call { .. } if vm.embedder.is_ending => vm.outside.inbox.answer(number, Answer::Ended),
-        Question::Call { function, arguments, is_urgent } => match begin_call(vm, &function, &arguments) {
-            Some(id) => {
-                if is_urgent {
-                    vm.scheduler.make_runnable(id.index, true);
-                }
-                vm.embedder.calls.insert(id.index, number);
+        Question::Call { function, arguments, goes_first } => {
+            let Some(id) = begin_call(vm, &function, &arguments, goes_first) else {
+                return vm.outside.inbox.answer(number, no_call(&function));
+            };
+            vm.embedder.calls.insert(id.index, number);
+            if goes_first {
+                vm.scheduler.make_runnable(id.index, true);
+                vm.embedder.first = Some(id);
             }
-            None => vm.outside.inbox.answer(number, no_call(&function)),
-        },
+        }
     }
 }
 
@@ -92,7 +94,7 @@ fn import_datum(vm: &mut Vm, datum: &Datum) -> Option<Value> {
 }
 
 /// Makes the task that calls a function for somebody outside; `None` if there is no room for it.
-fn begin_call(vm: &mut Vm, callee: &FunctionRef, arguments: &[Datum]) -> Option<TaskId> {
+fn begin_call(vm: &mut Vm, callee: &FunctionRef, arguments: &[Datum], goes_first: bool) -> Option<TaskId> {
     let function = vm.callee(callee)?;
     vm.embedder.pin(&mut vm.heap, function);
     let mut values = vec![function];
@@ -102,19 +104,26 @@ fn begin_call(vm: &mut Vm, callee: &FunctionRef, arguments: &[Datum]) -> Option<
         vm.embedder.pin(&mut vm.heap, value);
         values.push(value);
     }
-    let id = if values.len() <= arguments.len() {
-        None
-    } else if matches!(callee, FunctionRef::Named(name) if name.starts_with(LIBRARY)) {
-        vm.spawn_hidden(values[0], &values[1..]).ok()
-    } else {
-        vm.spawn(values[0], &values[1..]).ok()
+    let is_library = matches!(callee, FunctionRef::Named(name) if name.starts_with(LIBRARY));
+    let options = SpawnOptions {
+        priority: if goes_first { HIGHEST_PRIORITY } else { DEFAULT_PRIORITY },
+        daemon: is_library,
+        hidden: is_library,
+        ..SpawnOptions::default()
     };
+    let has_all = values.len() > arguments.len();
+    let id = has_all.then(|| spawn_kept(vm, values[0], &values[1..], options).ok()).flatten();
     values.into_iter().for_each(|value| vm.embedder.unpin(value));
     id
 }
 
-/// Aborts the task of the call that was asked for with this number.
+/// Aborts the task of the call that was asked for with this number, or does not begin it.
 pub(super) fn abort_call(vm: &mut Vm, number: u64) {
+    let is_it = |other: &Incoming| matches!(other, Incoming::Question { number: n, .. } if *n == number);
+    if let Some(place) = vm.embedder.deferred.iter().position(is_it) {
+        vm.embedder.deferred.remove(place);
+        return vm.outside.inbox.answer(number, Answer::Aborted);
+    }
     let call = vm.embedder.calls.iter().find(|&(_, &other)| other == number);
     if let Some(id) = call.and_then(|(&index, _)| vm.scheduler.tasks.id_at(index)) {
         vm.abort(id);

@@ -57,15 +57,6 @@ impl Vm {
         spawn_kept(self, function, arguments, SpawnOptions::default())
     }
 
-    /// Makes a task as [`Vm::spawn`] does, but one of the library, without which the run may end.
-    ///
-    /// # Errors
-    /// As [`Vm::spawn`].
-    pub(crate) fn spawn_hidden(&mut self, function: Value, arguments: &[Value]) -> Result<TaskId, Exit> {
-        let options = SpawnOptions { daemon: true, hidden: true, ..SpawnOptions::default() };
-        spawn_kept(self, function, arguments, options)
-    }
-
     /// Forgets a task that has ended; one that has not is dropped as it stands, without its cleanups.
     pub fn forget(&mut self, id: TaskId) {
         let scheduler = &mut self.scheduler;
@@ -91,7 +82,7 @@ impl Vm {
 }
 
 /// Makes a task that is kept, with a collection before if there is no room for it.
-fn spawn_kept(
+pub(super) fn spawn_kept(
     vm: &mut Vm,
     function: Value,
     arguments: &[Value],

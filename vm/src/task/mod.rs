@@ -434,6 +434,8 @@ const UNIT: usize = 16;
 
 /// Priority of a task that is given none.
 pub(crate) const DEFAULT_PRIORITY: u8 = 4;
+/// Highest priority.
+pub(crate) const HIGHEST_PRIORITY: u8 = PRIORITIES as u8 - 1;
 /// Number of priorities.
 pub(crate) const PRIORITIES: usize = 8;
 
