@@ -7,7 +7,7 @@ use esl_bytecode::symbol::Symbol;
 use super::expander::Expander;
 use super::form::{Checked, Form, Make, bound_twice, check_distinct, name, on_one_line, quoted};
 use super::function::Body;
-use super::job::{Job, LetBindings, To, UncheckedLet, VariableBinding};
+use super::job::{Job, LetBindings, PARTS_AT_ONCE, To, UncheckedLet, VariableBinding};
 use super::origin::OriginId;
 use super::scope::{ScopeEntry, VariableMeaning};
 use super::variable::Deed;
@@ -49,9 +49,6 @@ impl Expander {
         )
     }
 }
-
-/// Bindings of a `let` that are looked at in one part.
-const BINDINGS_AT_ONCE: usize = 1000;
 
 /// Returns the bindings of a form as they are written.
 fn written_bindings(form: &Form, shape: &str) -> Checked<Vec<Datum>> {
@@ -136,8 +133,8 @@ impl Expander {
         mut state: Box<UncheckedLet>,
     ) -> Checked {
         let UncheckedLet { form, sequential, items, found, seen, .. } = &mut *state;
-        for item in items.by_ref().take(BINDINGS_AT_ONCE) {
-            self.checked_bindings += 1;
+        for item in items.by_ref().take(PARTS_AT_ONCE) {
+            self.checked_parts += 1;
             let binding = binding(self, environment, form, &item)?;
             let span = binding.datum.span();
             if !*sequential && let Some(first) = seen.insert(binding.symbol.clone(), span) {
@@ -162,7 +159,7 @@ impl Expander {
     pub(super) fn go_on_with_let(&mut self, environment: &dyn Environment, mut state: Box<LetBindings>) {
         let LetBindings { form, to, sequential, found, body, jobs, entries, variables, bound } = &mut *state;
         let (to, sequential) = (*to, *sequential);
-        for VariableBinding { datum, symbol, value } in found.by_ref().take(BINDINGS_AT_ONCE) {
+        for VariableBinding { datum, symbol, value } in found.by_ref().take(PARTS_AT_ONCE) {
             let (node, job) = self.part(value, to);
             let (variable, entry) = self.bound_variable(environment, &symbol, &datum, body, form, to);
             variables.push((variable, node));

@@ -8,7 +8,7 @@ use rustc_hash::FxHashSet;
 
 use super::expander::Expander;
 use super::form::{Checked, Form, is_constant, is_known, name, plain, quoted};
-use super::job::{Job, To};
+use super::job::{Job, LongCond, PARTS_AT_ONCE, To};
 use super::scope::{ScopeEntry, Tag, Visible};
 use crate::core::{BlockId, BoundVariable, NodeId, NodeKind, TagbodyItem};
 use crate::diagnostic::code;
@@ -87,26 +87,32 @@ pub(super) fn or(expander: &mut Expander, _: &mut dyn Environment, form: Form, t
 /// so that the depth of nodes does not grow with the length of a form.
 const NESTED_CLAUSES: usize = 100;
 
-/// `(cond (test . body)*)`
-pub(super) fn cond(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
-    let mut clauses = Vec::new();
-    for clause in &form.args {
-        match clause.as_list() {
-            Some(parts) if !parts.is_empty() => {
-                clauses.push(parts.into_iter().cloned().collect::<Vec<Datum>>());
-            }
-            _ => {
-                let what = format!("needs clauses, each a list of a test and forms, not {}", quoted(clause));
-                return Err(form.fault(code::MALFORMED_CLAUSE, clause.span(), &what));
-            }
+/// Returns the parts of a clause of a `cond`: a test, and forms.
+fn clause_of_cond(form: &Form, clause: &Datum) -> Checked<Vec<Datum>> {
+    match clause.as_list() {
+        Some(parts) if !parts.is_empty() => Ok(parts.into_iter().cloned().collect()),
+        _ => {
+            let what = format!("needs clauses, each a list of a test and forms, not {}", quoted(clause));
+            Err(form.fault(code::MALFORMED_CLAUSE, clause.span(), &what))
         }
     }
-    if clauses.len() > NESTED_CLAUSES {
-        return long_cond(expander, clauses, to);
+}
+
+/// `(cond (test . body)*)`
+pub(super) fn cond(expander: &mut Expander, _: &mut dyn Environment, mut form: Form, to: To) -> Checked {
+    if form.args.len() > NESTED_CLAUSES {
+        let block = expander.block(None, to);
+        expander.core().blocks[block.index()].is_used = true;
+        let row = expander.child(to);
+        let items = std::mem::take(&mut form.args).into_iter();
+        let (nodes, jobs) = Default::default();
+        return expander.go_on_with_cond(Box::new(LongCond { form, to, block, row, items, nodes, jobs }));
     }
+    let clauses: Checked<Vec<Vec<Datum>>> =
+        form.args.iter().map(|clause| clause_of_cond(&form, clause)).collect();
     let mut jobs = Vec::new();
     let mut at = to;
-    let mut clauses = clauses.into_iter().peekable();
+    let mut clauses = clauses?.into_iter().peekable();
     while let Some(mut clause) = clauses.next() {
         let test = clause.remove(0);
         let is_true = is_constant(&test) && !test.is_nil();
@@ -144,39 +150,45 @@ pub(super) fn cond(expander: &mut Expander, _: &mut dyn Environment, form: Form,
     Ok(())
 }
 
-fn long_cond(expander: &mut Expander, clauses: Vec<Vec<Datum>>, to: To) -> Checked {
-    let block = expander.block(None, to);
-    expander.core().blocks[block.index()].is_used = true;
-    let row = expander.child(to);
-    expander.fill(to, NodeKind::Block(block, row.node));
-    let mut nodes = Vec::new();
-    let mut jobs = Vec::new();
-    for mut clause in clauses {
-        let item = expander.child(row);
-        nodes.push(item.node);
-        let (test, job) = expander.part(clause.remove(0), item);
-        jobs.push(job);
-        if clause.is_empty() {
-            // If the test is true, its first value is the value of the form. A variable keeps it until then.
-            let variable = expander.variable(Symbol::cl("COND"), to.span, to);
-            let chosen = expander.child(item);
-            let bindings = vec![(BoundVariable::Lexical(variable), test)];
-            expander.fill(item, NodeKind::Let { sequential: false, bindings, body: chosen.node });
-            let again = expander.child(chosen);
-            expander.read(variable, again);
-            let value = leave_if(expander, block, chosen, again.node);
-            expander.read(variable, value);
-        } else {
-            let value = leave_if(expander, block, item, test);
-            jobs.extend(expander.body(clause, value));
+impl Expander {
+    /// Goes on with the clauses of a long `cond`, each of which leaves a block with its value.
+    pub(super) fn go_on_with_cond(&mut self, mut state: Box<LongCond>) -> Checked {
+        let LongCond { form, to, block, row, items, nodes, jobs } = &mut *state;
+        for clause in items.by_ref().take(PARTS_AT_ONCE) {
+            let mut clause = clause_of_cond(form, &clause)?;
+            let item = self.child(*row);
+            nodes.push(item.node);
+            let (test, job) = self.part(clause.remove(0), item);
+            jobs.push(job);
+            if clause.is_empty() {
+                // If the test is true, its first value is the value of the form. A variable keeps it until
+                // then.
+                let variable = self.variable(Symbol::cl("COND"), to.span, *to);
+                let chosen = self.child(item);
+                let bindings = vec![(BoundVariable::Lexical(variable), test)];
+                self.fill(item, NodeKind::Let { sequential: false, bindings, body: chosen.node });
+                let again = self.child(chosen);
+                self.read(variable, again);
+                let value = leave_if(self, *block, chosen, again.node);
+                self.read(variable, value);
+            } else {
+                let value = leave_if(self, *block, item, test);
+                jobs.extend(self.body(clause, value));
+            }
         }
+        if items.len() > 0 {
+            self.schedule([Job::Cond(state)]);
+            return Ok(());
+        }
+        let LongCond { to, block, row, mut nodes, jobs, .. } = *state;
+        let end = self.child(row);
+        self.fill(end, NodeKind::Constant(Datum::nil(to.span)));
+        nodes.push(end.node);
+        self.fill(row, NodeKind::Progn(nodes));
+        self.fill(to, NodeKind::Block(block, row.node));
+        self.schedule(jobs);
+        Ok(())
     }
-    let end = expander.child(row);
-    expander.fill(end, NodeKind::Constant(Datum::nil(to.span)));
-    nodes.push(end.node);
-    expander.fill(row, NodeKind::Progn(nodes));
-    expander.schedule(jobs);
-    Ok(())
 }
 
 /// Makes `to` leave `block` if `test` is true; returns the destination of the values to leave with.

@@ -8,14 +8,14 @@
 
 use esl_bytecode::compile::{Environment, MacroCall, MacroRef, StepOutcome, Work};
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
-use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashSet;
 
 use super::chunk::{Chunk, OpenChunk, Purpose};
 use super::failure::{FailurePlace, MacroFailure};
-use super::form::{Checked, Form, Make, is_known, name, span_of};
+use super::form::{Checked, Form, Make, name};
 use super::global::GlobalUses;
 use super::job::{AwaitedOutcome, Job, To, Top};
 use super::origin::{OriginId, Origins};
@@ -29,13 +29,11 @@ pub(super) const MAX_DEPTH: u32 = 5_000;
 
 /// Limit on the size of the expansion of one top-level form, in bytes.
 const MAX_BYTES: usize = 64 << 20;
-/// Findings beyond which no more warnings are kept: nobody reads so many, and they take memory.
-const MAX_FINDINGS: usize = 10_000;
 /// Limit on the parts of data that go through the macros of one top-level form, as calls or expansions.
 const MAX_PASSED: u64 = 10_000_000;
 /// Forms after which the size of the expansion is looked at again.
 const MEASURED_EACH: u32 = 256;
-/// Names that go out of scope in one job.
+/// Names that come into scope, or go out of it, in one job.
 const NAMES_AT_ONCE: usize = 32;
 
 /// Expands a form of an operator into a node.
@@ -75,13 +73,13 @@ pub struct Expander {
     /// What the next answer is about.
     pub(super) waiting: AwaitedOutcome,
     /// Form of the last macro call for which the expander stopped.
-    call: Option<Datum>,
+    pub(super) call: Option<Datum>,
     /// Why the expander stops after the current job.
     pub(super) stopped: Option<Stop>,
     /// Findings that have not been taken yet.
-    diagnostics: Vec<Diagnostic>,
+    pub(super) diagnostics: Vec<Diagnostic>,
     /// Code, place and message of all findings.
-    reported: FxHashSet<(&'static str, Span, String)>,
+    pub(super) reported: FxHashSet<(&'static str, Span, String)>,
     /// Number of errors so far.
     pub(super) errors: usize,
     /// Whether the forms are those of a file, to which objects cannot be written.
@@ -96,7 +94,7 @@ pub struct Expander {
     /// Jobs until the size of the current top-level form is looked at.
     unmeasured: u32,
     /// Number of bindings of `let` forms that are known to be in order.
-    pub(super) checked_bindings: u64,
+    pub(super) checked_parts: u64,
     /// Uses and definitions of global names.
     pub(super) globals: GlobalUses,
 }
@@ -123,7 +121,7 @@ impl Expander {
             is_given_up: false,
             passed: 0,
             unmeasured: 0,
-            checked_bindings: 0,
+            checked_parts: 0,
             globals: GlobalUses::default(),
         }
     }
@@ -168,7 +166,7 @@ impl Expander {
 
     /// Returns the number of nodes in the chunk that is being built, and of the bindings looked at before.
     fn progress(&self) -> u64 {
-        self.open.last().map_or(0, |open| open.core.nodes.len() as u64) + self.checked_bindings
+        self.open.last().map_or(0, |open| open.core.nodes.len() as u64) + self.checked_parts
     }
 
     /// Returns about how many bytes the expansion of the current top-level form takes.
@@ -217,6 +215,8 @@ impl Expander {
             match job {
                 Job::Expand(_, to) => return self.fill_nil(to),
                 Job::CheckLet(state) => return self.fill_nil(state.to),
+                Job::Cond(state) => return self.fill_nil(state.to),
+                Job::LocalFunctions(state) => return self.fill_nil(state.to),
                 Job::Place(_, to) => return self.places.push(SetfExpansion::broken(to.span)),
                 Job::Macro(..) => return self.objects.push(None),
                 Job::TopLevel(..) => return,
@@ -228,6 +228,14 @@ impl Expander {
                 let to = to.at(&form);
                 let outcome = self.expand(environment, form, to);
                 self.settle(outcome, to);
+            }
+            Job::Enter(entries) if entries.len() > NAMES_AT_ONCE => {
+                let mut entries = entries.into_iter().peekable();
+                let mut jobs = Vec::new();
+                while entries.peek().is_some() {
+                    jobs.push(Job::Enter(entries.by_ref().take(NAMES_AT_ONCE).collect()));
+                }
+                self.schedule(jobs);
             }
             Job::Enter(entries) => {
                 let level = self.level();
@@ -251,6 +259,16 @@ impl Expander {
                 self.settle(outcome, to);
             }
             Job::Let(bindings) => self.go_on_with_let(environment, bindings),
+            Job::Cond(state) => {
+                let to = state.to;
+                let outcome = self.go_on_with_cond(state);
+                self.settle(outcome, to);
+            }
+            Job::LocalFunctions(state) => {
+                let to = state.to;
+                let outcome = self.go_on_with_functions(environment, state);
+                self.settle(outcome, to);
+            }
             Job::Lambda(text, lambda, to) => self.expand_lambda(environment, *text, lambda, to),
             Job::Macro(form, to) => {
                 let purpose = Purpose { emit: false, load: true, keep: true };
@@ -477,56 +495,6 @@ impl Expander {
                 };
                 self.report(diagnostic, None);
             }
-        }
-    }
-
-    // ---- findings
-
-    /// Reports the failure of the macro whose call at `span` the expander stopped for.
-    fn macro_failed(&mut self, failure: &MacroFailure, origin: Option<OriginId>, span: Span) {
-        let origin = origin.map(|origin| self.origins.get(origin));
-        let failed = origin.map_or_else(|| "a macro".to_string(), |origin| name(&origin.name));
-        let is_standard = origin.is_some_and(|origin| origin.is_standard);
-        // Checks of arguments begin with the name of the macro, which the message contains already.
-        let shown = origin.map(|origin| origin.name.to_string() + " ").unwrap_or_default();
-        let report = failure.report.strip_prefix(&shown).unwrap_or(&failure.report);
-        let call = self.call.take();
-        let head = call.as_ref().and_then(Datum::as_cons).map_or(span, |(head, _)| span_of(head, span));
-        // A macro of the language fails only on a form that it cannot take.
-        let diagnostic = if is_standard {
-            let part = call.and_then(|call| failure.faulty_part(&call));
-            let diagnostic = code::MALFORMED_FORM.at(part.unwrap_or(head), format!("{failed} {report}"));
-            match &failure.usage {
-                Some(usage) => diagnostic.help(format!("it is written `{usage}`")),
-                None => diagnostic,
-            }
-        } else {
-            let message = format!("{failed} failed while it was expanded: {report}");
-            failure.located(code::MACRO_FAILED.at(head, message))
-        };
-        self.report(diagnostic, None);
-    }
-
-    /// Reports a finding about a form that the macro call `origin`, if any, has made.
-    pub(super) fn report(&mut self, mut diagnostic: Diagnostic, origin: Option<OriginId>) {
-        if diagnostic.severity == Severity::Error {
-            self.errors += 1;
-            if let Some(origin) = origin.map(|origin| self.origins.get(origin)) {
-                let text = format!("in the expansion of {}", name(&origin.name));
-                if diagnostic.primary.span == origin.span && diagnostic.primary.text.is_empty() {
-                    diagnostic.primary.text = text;
-                } else if !origin.is_standard && is_known(origin.span) {
-                    diagnostic = diagnostic.also(origin.span, text);
-                }
-            }
-        }
-        if diagnostic.severity == Severity::Warning && self.reported.len() >= MAX_FINDINGS {
-            return;
-        }
-        // A macro may have used the same part twice.
-        let place = (diagnostic.code, diagnostic.primary.span, diagnostic.message.clone());
-        if self.reported.insert(place) {
-            self.diagnostics.push(diagnostic);
         }
     }
 }

@@ -13,7 +13,7 @@ use super::function::{Body, FunctionText};
 use super::origin::OriginId;
 use super::scope::ScopeEntry;
 use super::setf::PlaceUse;
-use crate::core::{BoundVariable, LambdaId, NodeId, VarId};
+use crate::core::{BlockId, BoundVariable, LambdaId, NodeId, VarId};
 
 /// Destination of an expansion.
 #[derive(Clone, Copy, Debug)]
@@ -86,6 +86,9 @@ impl Top {
     }
 }
 
+/// Parts of a long form (bindings, clauses, definitions) that are looked at in one step.
+pub(super) const PARTS_AT_ONCE: usize = 1000;
+
 /// A binding of a `let`: the name as written, its symbol, and the form of the value.
 #[derive(Debug)]
 pub(super) struct VariableBinding {
@@ -131,6 +134,43 @@ pub(super) struct LetBindings {
     pub(super) bound: Vec<Symbol>,
 }
 
+/// A long `cond` some of whose clauses are part of the block that they leave.
+#[derive(Debug)]
+pub(super) struct LongCond {
+    /// The whole form, whose arguments are the clauses.
+    pub(super) form: Form,
+    pub(super) to: To,
+    pub(super) block: BlockId,
+    /// Destination of the row of clauses.
+    pub(super) row: To,
+    /// Clauses that are to be looked at.
+    pub(super) items: std::vec::IntoIter<Datum>,
+    /// Nodes of the others.
+    pub(super) nodes: Vec<NodeId>,
+    /// What is to be done for these.
+    pub(super) jobs: Vec<Job>,
+}
+
+/// A `flet` or `labels` some of whose functions are known to be in order.
+#[derive(Debug)]
+pub(super) struct LocalFunctions {
+    /// The whole form.
+    pub(super) form: Form,
+    pub(super) to: To,
+    /// Whether the functions see each other.
+    pub(super) recursive: bool,
+    /// Definitions that are to be looked at, as written.
+    pub(super) items: std::vec::IntoIter<Datum>,
+    /// Places of the names, which must differ.
+    pub(super) seen: FxHashMap<Symbol, Span>,
+    /// The functions.
+    pub(super) functions: Vec<(VarId, LambdaId)>,
+    /// Their names, as they enter a scope.
+    pub(super) entries: Vec<ScopeEntry>,
+    /// What expands their texts.
+    pub(super) lambdas: Vec<Job>,
+}
+
 /// A step of the expander.
 #[derive(Debug)]
 pub(super) enum Job {
@@ -146,6 +186,10 @@ pub(super) enum Job {
     CheckLet(Box<UncheckedLet>),
     /// Binds more variables of a `let`.
     Let(Box<LetBindings>),
+    /// Looks at more clauses of a long `cond`.
+    Cond(Box<LongCond>),
+    /// Looks at more definitions of local functions.
+    LocalFunctions(Box<LocalFunctions>),
     /// Compiles the function of a local macro, given as a form.
     Macro(Datum, To),
     /// Enters local macros; their functions are the newest of the kept objects.

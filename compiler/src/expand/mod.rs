@@ -69,9 +69,9 @@
 //! # Layers
 //!
 //! Data and tables come first (`form`, `scope`, `lambda_list`, `function`, `setf`, `origin`, `job`, `chunk`,
-//! `failure`, `global`), then the [`Expander`], then one file for each family of forms, whose methods are
-//! methods of the `Expander`, and last the table of operators. A file uses only files before it;
-//! `tests/layers.rs` holds that.
+//! `failure`, `global`), then the [`Expander`] and its findings (`finding`), then one file for each family
+//! of forms, whose methods are methods of the `Expander`, and last the table of operators. A file uses only
+//! files before it; `tests/layers.rs` holds that.
 
 mod backquote;
 mod binding;
@@ -85,6 +85,7 @@ mod destructure;
 mod ending;
 mod expander;
 mod failure;
+mod finding;
 mod form;
 mod function;
 mod global;

@@ -192,15 +192,16 @@ impl Lowering {
                     self.divide(too_large, limits, shares_vectors);
                 }
                 LoweringStage::Free(module) => {
-                    let left = self.core.nodes.len();
-                    if left == 0 {
+                    let (nodes, lambdas) = (self.core.nodes.len(), self.core.lambdas.len());
+                    if nodes == 0 && lambdas == 0 {
                         return Some(Ok(*module));
                     }
                     self.stage = LoweringStage::Free(module);
                     if work.is_done() {
                         return None;
                     }
-                    self.core.nodes.truncate(left.saturating_sub(FREED_PER_UNIT));
+                    self.core.nodes.truncate(nodes.saturating_sub(FREED_PER_UNIT));
+                    self.core.lambdas.truncate(lambdas.saturating_sub(LAMBDAS_FREED_PER_UNIT));
                     work.add(1);
                 }
             }
@@ -212,7 +213,10 @@ impl Lowering {
 const LARGE_FUNCTION: usize = 12_000;
 
 /// Nodes that are freed in a unit of work.
-const FREED_PER_UNIT: usize = 64;
+const FREED_PER_UNIT: usize = 16;
+
+/// Lambdas that are freed in a unit of work.
+const LAMBDAS_FREED_PER_UNIT: usize = 4;
 
 /// Nodes that count as a unit of work where the whole form is looked at.
 const NODES_PER_UNIT: u64 = 8;

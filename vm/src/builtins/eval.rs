@@ -51,14 +51,17 @@ use super::reading::{ReadOutcome, read_datum};
 /// work, which is worth more than a cell of a list.
 const WORK_UNITS: usize = 256;
 
-/// Steps of the walk in which a form becomes a datum that are taken at once.
-const FORM_STEP: usize = 4096;
+/// Steps of the walk in which a form becomes a datum that are taken at once: a slice's worth.
+const FORM_STEP: usize = 2048;
+
+/// As [`WORK_UNITS`], for each of these: most look into large hash tables.
+const FORM_UNITS: usize = 64;
 
 /// Data of a compilation that has ended that are freed in one step.
 const FREED_STEP: usize = 4096;
 
 /// As [`WORK_UNITS`], for each of these.
-const FORM_UNITS: usize = 16;
+const FREED_UNITS: usize = 16;
 
 /// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text
 /// without a name.
@@ -85,9 +88,11 @@ fn take_job(vm: &mut Vm, handle: Value) -> Result<(JobId, CompilerJob), Exit> {
 /// Goes on making a datum of a form. Returns its compilation when that is over.
 fn go_on_with_form(vm: &mut Vm, form: &mut FormWalk) -> Result<Option<ActiveCompilation>, Exit> {
     vm.heap.check_room(0)?;
-    let datum = form.walk.run(&mut form.unit, &vm.heap, &vm.world, FORM_STEP);
-    let work = form.unit.take_work();
-    vm.exchange.charge(work as usize * FORM_UNITS);
+    let mut left = FORM_STEP;
+    let datum = form.walk.run(&mut form.unit, &vm.heap, &vm.world, &mut left);
+    // What does not go through macros is not counted as such.
+    _ = form.unit.take_work();
+    vm.exchange.charge((FORM_STEP - left) * FORM_UNITS);
     let datum = match datum {
         Ok(Some(datum)) => datum,
         Ok(None) => return Ok(None),
@@ -116,13 +121,12 @@ fn answer(
         running.expansion = Some(DatumWalk::new(outcome, Span::default()));
     }
     if let Some(walk) = &mut running.expansion {
-        let walked = walk.run(unit, &vm.heap, &vm.world, FORM_STEP);
+        let mut left = FORM_STEP;
+        let walked = walk.run(unit, &vm.heap, &vm.world, &mut left);
+        vm.exchange.charge((FORM_STEP - left) * FORM_UNITS);
         let outcome = match walked {
             Ok(Some(expansion)) => StepOutcome::Expansion(expansion),
-            Ok(None) => {
-                vm.exchange.charge(FORM_STEP * FORM_UNITS);
-                return Ok(None);
-            }
+            Ok(None) => return Ok(None),
             Err(DatumError::NoRoom(bytes)) => {
                 vm.heap.check_room(bytes)?;
                 return Err(Exit::Collect);
@@ -395,7 +399,7 @@ fn go_on_loading(vm: &mut Vm, running: &mut ActiveCompilation) -> Result<Option<
 pub(super) fn end_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.compiler.end(arguments[0]);
     let (freed, are_left) = vm.compiler.free(FREED_STEP);
-    vm.exchange.charge(freed * FORM_UNITS);
+    vm.exchange.charge(freed * FREED_UNITS);
     recount(vm);
     Ok(Value::boolean(are_left))
 }

@@ -304,8 +304,9 @@ impl Unit {
         span: Span,
     ) -> Result<Datum, DatumError> {
         let mut walk = DatumWalk::new(object, span);
+        let mut left = usize::MAX;
         loop {
-            if let Some(datum) = walk.run(self, heap, world, usize::MAX)? {
+            if let Some(datum) = walk.run(self, heap, world, &mut left)? {
                 return Ok(datum);
             }
         }

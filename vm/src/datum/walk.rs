@@ -82,8 +82,8 @@ impl DatumWalk {
         self.steps.capacity() * size_of::<ToDatum>() + (self.made.len() + self.met.len()) * NODE_BYTES
     }
 
-    /// Goes on with the walk. Returns the datum, or `None` after `allowed` steps more: each compound node
-    /// takes two.
+    /// Goes on with the walk. Returns the datum, or `None` after the steps that are `left`, which it counts
+    /// down: each compound node takes two.
     ///
     /// # Errors
     /// [`DatumError`]; for want of room, the walk can go on when there is some.
@@ -92,10 +92,10 @@ impl DatumWalk {
         unit: &mut Unit,
         heap: &Heap,
         world: &World,
-        allowed: usize,
+        left: &mut usize,
     ) -> Result<Option<Datum>, DatumError> {
         let start = self.nodes;
-        let outcome = self.go_on(unit, heap, world, allowed);
+        let outcome = self.go_on(unit, heap, world, left);
         unit.work += (self.nodes - start) as u64;
         match outcome {
             Ok(datum) => Ok(datum),
@@ -117,18 +117,17 @@ impl DatumWalk {
         unit: &mut Unit,
         heap: &Heap,
         world: &World,
-        allowed: usize,
+        left: &mut usize,
     ) -> Result<Option<Datum>, WalkError> {
         let span = self.span;
-        let mut left = allowed;
         // What has been made already is counted when a part of the walk is over.
         let room = heap.room() / NODE_BYTES;
         let before = self.made.len() + self.met.len();
         while !self.steps.is_empty() {
-            if left == 0 {
+            if *left == 0 {
                 return Ok(None);
             }
-            left -= 1;
+            *left -= 1;
             if self.made.len() + self.met.len() > room.saturating_add(before) {
                 return Err(WalkError::Datum(DatumError::NoRoom((room + 1) * NODE_BYTES)));
             }
