@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use crate::datum::{Datum, ObjectId};
 use crate::diagnostic::Diagnostic;
+use crate::locals::Locals;
 use crate::module::Module;
 use crate::span::{SourceId, Span};
 use crate::symbol::Symbol;
@@ -133,15 +134,6 @@ pub enum MacroRef {
     Local(ObjectId),
 }
 
-/// One local definition that a macro's environment argument knows of, for `macroexpand` inside macros.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LocalDefinition {
-    /// The name.
-    pub name: Symbol,
-    /// The macro function; `None` for a local function, which hides a macro of that name.
-    pub expander: Option<ObjectId>,
-}
-
 /// A macro call to be run.
 #[derive(Clone, Debug)]
 pub struct MacroCall {
@@ -149,8 +141,8 @@ pub struct MacroCall {
     pub function: MacroRef,
     /// The whole form.
     pub form: Datum,
-    /// The local macros and functions around it, innermost first.
-    pub locals: Arc<[LocalDefinition]>,
+    /// The local definitions around it.
+    pub locals: Locals,
 }
 
 /// Next need of a compilation.

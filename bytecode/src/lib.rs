@@ -13,6 +13,7 @@ pub mod diagnostic;
 pub mod disasm;
 pub mod file;
 pub mod link;
+pub mod locals;
 pub mod module;
 pub mod opcode;
 pub mod operand;

@@ -423,7 +423,7 @@ impl Expander {
         let origin = self.enter_origin(&form.operator, form.span, is_standard, around)?;
         self.waiting = waiting(origin);
         self.call = Some(form.datum.clone());
-        let locals = self.scope.locals();
+        let locals = self.scope.locals().clone();
         self.stopped = Some(Stop::Macro(MacroCall { function, form: form.datum.clone(), locals }));
         Ok(())
     }

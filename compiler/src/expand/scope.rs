@@ -8,11 +8,10 @@
 //! macros around it, but no variables, functions, blocks or tags. Every meaning knows the level of its chunk;
 //! see [`Visible::OutOfReach`].
 
-use std::sync::Arc;
-
 use esl_bytecode::BigInt;
-use esl_bytecode::compile::{Arity, LocalDefinition};
+use esl_bytecode::compile::Arity;
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
+use esl_bytecode::locals::{LocalMeaning, Locals};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashMap;
@@ -105,7 +104,7 @@ struct Held<T> {
 #[derive(Debug)]
 enum Undo {
     Variable(Symbol, Option<Held<VariableMeaning>>, Option<Span>),
-    Function(Symbol, Option<Held<FunctionMeaning>>, Option<Arc<[LocalDefinition]>>),
+    Function(Symbol, Option<Held<FunctionMeaning>>),
     Block(Symbol, Option<Held<BlockId>>),
     Tag(Tag, Option<Held<(TagbodyId, u32)>>),
     Written(Symbol, Option<bool>),
@@ -121,10 +120,8 @@ pub(super) struct Scope {
     /// Functions that are declared `notinline` here, or `inline`.
     written: FxHashMap<Symbol, bool>,
     log: Vec<Undo>,
-    /// Functions and macros in scope, the innermost last.
-    definitions: Vec<LocalDefinition>,
-    /// `definitions` in reverse order, computed on demand.
-    locals: Option<Arc<[LocalDefinition]>>,
+    /// What macros may ask for: functions, macros, symbol macros, and variables that hide one of these.
+    locals: Locals,
 }
 
 impl Scope {
@@ -132,17 +129,24 @@ impl Scope {
     pub(super) fn enter(&mut self, entry: ScopeEntry, level: usize) {
         let undo = match entry {
             ScopeEntry::Variable(name, meaning, report) => {
+                let told = match &meaning {
+                    VariableMeaning::SymbolMacro(form) => Some(LocalMeaning::SymbolMacro(form.clone())),
+                    _ => self.is_symbol_macro(&name).then_some(LocalMeaning::Variable),
+                };
+                if let Some(told) = told {
+                    self.locals = self.locals.with(name.clone(), told);
+                }
                 let old = self.variables.insert(name.clone(), Held { meaning, level });
                 Undo::Variable(name, old, report)
             }
             ScopeEntry::Function(name, meaning) => {
-                let expander = match &meaning {
-                    FunctionMeaning::Macro(expander) => *expander,
-                    FunctionMeaning::Local(..) => None,
+                let told = match &meaning {
+                    FunctionMeaning::Macro(Some(function)) => LocalMeaning::Macro(*function),
+                    FunctionMeaning::Macro(None) | FunctionMeaning::Local(..) => LocalMeaning::Function,
                 };
-                self.definitions.push(LocalDefinition { name: name.clone(), expander });
+                self.locals = self.locals.with(name.clone(), told);
                 let old = self.functions.insert(name.clone(), Held { meaning, level });
-                Undo::Function(name, old, self.locals.take())
+                Undo::Function(name, old)
             }
             ScopeEntry::Block(name, block) => {
                 let old = self.blocks.insert(name.clone(), Held { meaning: block, level });
@@ -165,6 +169,10 @@ impl Scope {
         match self.log.pop()? {
             Undo::Variable(name, old, report) => {
                 let gone = restore(&mut self.variables, &name, old);
+                let is_told = |held: &Held<_>| matches!(held.meaning, VariableMeaning::SymbolMacro(_));
+                if gone.as_ref().is_some_and(is_told) || self.is_symbol_macro(&name) {
+                    self.leave_local();
+                }
                 match (gone.map(|held| held.meaning), report) {
                     (Some(VariableMeaning::Lexical(variable)), Some(span)) => {
                         Some(Gone { name, variable, span })
@@ -172,10 +180,9 @@ impl Scope {
                     _ => None,
                 }
             }
-            Undo::Function(name, old, locals) => {
+            Undo::Function(name, old) => {
                 restore(&mut self.functions, &name, old);
-                self.definitions.pop();
-                self.locals = locals;
+                self.leave_local();
                 None
             }
             Undo::Block(name, old) => {
@@ -238,10 +245,19 @@ impl Scope {
         self.blocks.keys()
     }
 
-    /// Returns the local functions and macros, the innermost first.
-    pub(super) fn locals(&mut self) -> Arc<[LocalDefinition]> {
-        let definitions = &self.definitions;
-        self.locals.get_or_insert_with(|| definitions.iter().rev().cloned().collect()).clone()
+    /// Returns what macros may ask for.
+    pub(super) fn locals(&self) -> &Locals {
+        &self.locals
+    }
+
+    fn is_symbol_macro(&self, name: &Symbol) -> bool {
+        matches!(self.variables.get(name), Some(Held { meaning: VariableMeaning::SymbolMacro(_), .. }))
+    }
+
+    fn leave_local(&mut self) {
+        if let Some(innermost) = self.locals.innermost() {
+            self.locals = innermost.outer.clone();
+        }
     }
 }
 

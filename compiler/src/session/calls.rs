@@ -6,6 +6,7 @@
 
 use esl_bytecode::compile::{MacroCall, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::locals::Locals;
 use esl_bytecode::span::Span;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -48,7 +49,7 @@ impl FormCalls {
         let DatumKind::Call(call) = self.calls.last()?.kind() else { return None };
         let form = self.replace(call);
         let operator = form.as_cons()?.0.as_symbol()?.clone();
-        Some(MacroCall { function: MacroRef::Global(operator), form, locals: [].into() })
+        Some(MacroCall { function: MacroRef::Global(operator), form, locals: Locals::default() })
     }
 
     /// Returns the place of the call that is being made.

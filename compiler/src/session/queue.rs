@@ -20,6 +20,7 @@ use std::sync::Arc;
 use esl_bytecode::compile::{Environment, MacroCall, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::locals::Locals;
 use esl_bytecode::module::{Constant, Module};
 use esl_bytecode::span::{SourceId, Span};
 use esl_bytecode::symbol::{CL_PACKAGE, CL_USER_PACKAGE, Home, Symbol, USER_PACKAGE};
@@ -142,7 +143,11 @@ impl FormQueue {
         let operator = Symbol::esl("%READ-FORM");
         let is_all = if is_all { Datum::symbol(Symbol::cl("T"), span) } else { Datum::nil(span) };
         let form = [Datum::symbol(operator.clone(), span), Datum::string(part, span), is_all];
-        MacroCall { function: MacroRef::Global(operator), form: Datum::list(form, span), locals: [].into() }
+        MacroCall {
+            function: MacroRef::Global(operator),
+            form: Datum::list(form, span),
+            locals: Locals::default(),
+        }
     }
 
     /// Takes what the program has read: `(:form datum end)`, where END counts characters, `(:end)`, or

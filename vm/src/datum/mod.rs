@@ -12,6 +12,7 @@
 //! Guarantees: walks use no native stack in proportion to depth. Circular and oversized structure is refused
 //! with a text.
 
+mod environment;
 mod walk;
 
 use std::collections::BTreeMap;
@@ -26,6 +27,7 @@ use crate::value::Value;
 use crate::world::load::{SharedObjects, array, character, integer, ratio};
 use crate::world::{GivenMap, GivenSet, RootMap, World};
 
+use environment::Environments;
 pub(crate) use walk::DatumWalk;
 use walk::{ObjectParts, parts_of, plain_kind};
 
@@ -79,6 +81,8 @@ pub(crate) struct Unit {
     made: GivenSet<u64>,
     /// Objects of the calls ([`DatumKind::Call`]) in the data that became objects, the innermost first.
     calls: Vec<Value>,
+    /// Environments of macro calls.
+    environments: Environments,
     /// Nodes visited since the last call of [`Unit::take_work`].
     work: u64,
     /// Whether the data are for the embedder, who knows its own.
@@ -149,6 +153,7 @@ impl Unit {
         self.uninterned.values().copied().for_each(&mut *visit);
         self.data.values().for_each(|&(value, _)| visit(value));
         self.values.values().for_each(|&(_, value)| visit(value));
+        self.environments.roots(visit);
         self.calls.iter().copied().for_each(visit);
     }
 
@@ -159,7 +164,8 @@ impl Unit {
 
     /// Returns about how many bytes the unit takes with its data.
     pub(crate) fn bytes(&self) -> usize {
-        self.data.len() * NODE_BYTES + self.objects.len() * 4 * size_of::<Value>()
+        let objects = self.objects.len() * 4 * size_of::<Value>();
+        self.data.len() * NODE_BYTES + objects + self.environments.bytes()
     }
 
     /// Returns the number of nodes visited since the last call.

@@ -5,9 +5,7 @@
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{
-    Compile, CompileTimeFailure, CompileTimeHost, Halt, LocalDefinition, MacroCall, MacroRef,
-};
+use esl_bytecode::compile::{Compile, CompileTimeFailure, CompileTimeHost, Halt, MacroCall, MacroRef};
 use esl_bytecode::datum::{Datum, ObjectId};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::file::ModuleImage;
@@ -148,13 +146,7 @@ fn prepare(vm: &mut Vm, call: &MacroCall, unit: &mut Unit) -> Result<Option<[Val
     };
     let Some(function) = function else { return Ok(None) };
     let form = unit.value_of(&mut vm.heap, &mut vm.world, &call.form)?;
-    let mut environment = Value::NIL;
-    for LocalDefinition { name, expander } in call.locals.iter().rev() {
-        let name = unit.symbol_object(&mut vm.heap, &mut vm.world, name)?;
-        let expander = expander.and_then(|id| unit.pinned(id)).unwrap_or(Value::NIL);
-        let entry = vm.heap.cons(name, expander)?;
-        environment = vm.heap.cons(entry, environment)?;
-    }
+    let environment = unit.environment(&mut vm.heap, &mut vm.world, &call.locals)?;
     Ok(Some([function, form, environment]))
 }
 

@@ -1,17 +1,16 @@
-use std::sync::Arc;
-
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{
-    Compilation, Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef, Part, Step, StepOutcome,
-    Work,
+    Compilation, Compile, CompileTimeHost, MacroCall, MacroRef, Part, Step, StepOutcome, Work,
 };
 use esl_bytecode::datum::DatumKind;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file::{ImageBytes, ModuleImage, write};
+use esl_bytecode::locals::{LocalMeaning, Locals};
 use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, PoolIdx};
 
 use super::*;
+use crate::datum::Unit;
 use crate::world::load::prepare;
 
 fn span() -> Span {
@@ -137,7 +136,7 @@ fn a_macro_is_run_for_the_compiler() {
     load(&mut vm, &macro_module());
     let argument = Datum::string("text", span());
     let form = Datum::list([Datum::symbol(Symbol::esl("QUOTED"), span()), argument.clone()], span());
-    let locals: Arc<[LocalDefinition]> = [LocalDefinition { name: Symbol::esl("F"), expander: None }].into();
+    let locals = Locals::default().with(Symbol::esl("F"), LocalMeaning::Function);
     let call = |name| MacroCall {
         function: MacroRef::Global(Symbol::esl(name)),
         form: form.clone(),
@@ -148,6 +147,25 @@ fn a_macro_is_run_for_the_compiler() {
     let quoted = expansion.as_list().unwrap()[1].clone();
     assert!(quoted.as_list().unwrap()[0].is_same(&argument), "the argument comes back as it was written");
     assert!(vm.expand(&call("UNDEFINED")).is_err());
+}
+
+#[test]
+fn environments_share_what_they_have_in_common() {
+    let mut vm = Vm::for_tests();
+    let mut unit = Unit::default();
+    let outer = Locals::default().with(Symbol::esl("F"), LocalMeaning::Function);
+    let inner = outer.with(Symbol::esl("G"), LocalMeaning::Function);
+    let beside = outer.with(Symbol::esl("H"), LocalMeaning::Variable);
+    let mut made = |locals: &Locals| unit.environment(&mut vm.heap, &mut vm.world, locals).unwrap();
+    let (first, second, third, again) = (made(&inner), made(&beside), made(&outer), made(&inner));
+    assert_eq!(made(&inner), again);
+    assert_eq!(made(&Locals::default()), Value::NIL);
+    let rest = |environment| vm.heap.as_cons(environment).unwrap().cdr;
+    assert_eq!([rest(first), rest(second), rest(again)], [third; 3]);
+    assert_ne!(first, second);
+    let entry = vm.heap.car(second).unwrap();
+    let key = vm.heap.car(entry).unwrap();
+    assert!(vm.heap.as_cons(key).is_some() && vm.heap.as_cons(entry).unwrap().cdr.is_nil());
 }
 
 #[test]
@@ -173,7 +191,7 @@ impl Compilation for ToyCompilation {
         match (std::mem::replace(self, ToyCompilation::Expanding), answer) {
             (ToyCompilation::Start(form), StepOutcome::Start) => {
                 let name = form.as_cons().unwrap().0.as_symbol().unwrap().clone();
-                Step::Expand(MacroCall { function: MacroRef::Global(name), form, locals: [].into() })
+                Step::Expand(MacroCall { function: MacroRef::Global(name), form, locals: Locals::default() })
             }
             (_, StepOutcome::Expansion(expansion)) => {
                 let DatumKind::Object(id) = expansion.kind() else {
