@@ -9,7 +9,7 @@ use crate::interp;
 use crate::raise::{Exit, Raised};
 use crate::report::{self, Happening};
 use crate::schedule::{AccountOwner, Amount, Measure};
-use crate::task::{AccountId, Bindings, DEFAULT_PRIORITY, Fund, Task, TaskId, TaskNumber, TaskState};
+use crate::task::{AccountId, Bindings, DEFAULT_PRIORITY, Flags, Fund, Task, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, lineage};
@@ -162,13 +162,15 @@ pub(crate) fn make_task(
     task.serial = scheduler.serial.advance();
     task.priority = options.priority;
     task.notify = notify;
-    task.flags.set_daemon(options.daemon);
-    task.flags.set_hidden(options.hidden);
+    // Stored at once: to load what was stored in parts just before takes as long as a miss of the cache.
+    let mut flags = Flags::default();
+    flags.set_daemon(options.daemon);
+    flags.set_hidden(options.hidden);
     if let Some(fund) = fund {
         task.extra_mut().fund = Some(fund);
     }
     if let Some(maker) = scheduler.running.as_ref().filter(|_| !options.is_service) {
-        task.flags.set_serves_cleanup(maker.runs_cleanup() || maker.flags.serves_cleanup());
+        flags.set_serves_cleanup(maker.runs_cleanup() || maker.flags.serves_cleanup());
         if maker.account != AccountId::NONE {
             // What a cleanup makes in a form that has used up its account is not to end at once.
             let is_free = maker.runs_cleanup();
@@ -188,6 +190,7 @@ pub(crate) fn make_task(
             task.control.bindings = control.bindings.copy(&without);
         }
     }
+    task.flags = flags;
     task.recount(heap);
     if let Some(ticks) = options.budget {
         let above = task.account;
