@@ -169,10 +169,13 @@ const HASHED_PARTS: usize = 64;
 /// Number of characters of a string that its hash looks at.
 const HASHED_CHARACTERS: usize = 4096;
 
+/// By what [`mix`] multiplies.
+pub const HASH_FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
+
 /// Mixes a word into a hash.
 #[inline]
 fn mix(hash: u64, word: u64) -> u64 {
-    (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+    (hash.rotate_left(5) ^ word).wrapping_mul(HASH_FACTOR)
 }
 
 /// Folds the upper half of a product, which depends on all bits of its factors, into the lower half.

@@ -3,6 +3,8 @@
 use std::ffi::c_void;
 use std::mem::MaybeUninit;
 
+use esl_heap::table::LastLookup;
+
 /// The function has returned; the value is in the reply. Its frame is still the topmost one.
 pub const RETURNED: u64 = 0;
 /// The interpreter is to go on at `pc` in the frame `base`; it repeats the instruction there.
@@ -123,6 +125,12 @@ pub struct NativeContext {
     pub unbind: NativeHelper,
     /// Makes a pair.
     pub cons: NativeCons,
+    /// The entry that the last search in a hash table has found.
+    pub last_lookup: *mut LastLookup,
+    /// Whether the collector wants the next tick to be a safepoint.
+    pub gc_due: *const bool,
+    /// What has been charged beside ticks: not zero if the next builtin is to see to it.
+    pub charges: *const u64,
     /// Finds the value of a key: with what it is if the table has none.
     pub value_of_key: NativeLookup,
     /// Sets the value of a key that the table has.

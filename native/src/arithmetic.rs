@@ -174,7 +174,7 @@ impl Translator<'_, '_> {
     }
 
     /// Returns the result of two fixnums; what overflows goes to `otherwise`.
-    fn on_fixnums(&mut self, operation: Arithmetic, x: Ssa, y: Ssa, otherwise: Block) -> Ssa {
+    pub(crate) fn on_fixnums(&mut self, operation: Arithmetic, x: Ssa, y: Ssa, otherwise: Block) -> Ssa {
         let (result, overflow) = match operation {
             Arithmetic::Add => self.b.ins().sadd_overflow(x, y),
             Arithmetic::Subtract => self.b.ins().ssub_overflow(x, y),

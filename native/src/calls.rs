@@ -4,9 +4,7 @@ use std::mem::offset_of;
 
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::{Block, InstBuilder, Value as Ssa, types};
-use esl_bytecode::builtin::Builtin;
 use esl_bytecode::operand::Want;
-use esl_heap::Value;
 use esl_heap::heap::Kind;
 use esl_heap::heap::layout::{CodeObject, FunctionObject, SymbolObject};
 
@@ -20,18 +18,6 @@ use crate::translate::Translator;
 
 /// Where the link of a frame has its function, from the frame's base on.
 const FUNCTION: i32 = -2 * WORD;
-
-/// Returns the place in the context of the function of the machine that does a builtin of hash tables, called
-/// with so many arguments.
-pub(crate) fn lookup_of(builtin: u32, count: u8) -> Option<usize> {
-    let is = |other: Builtin| builtin == other.number();
-    match count {
-        2 | 3 if is(Builtin::Gethash) => Some(offset_of!(NativeContext, value_of_key)),
-        3 if is(Builtin::Puthash) => Some(offset_of!(NativeContext, set_value_of_key)),
-        4 if is(Builtin::AddToValue) => Some(offset_of!(NativeContext, add_to_value_of_key)),
-        _ => None,
-    }
-}
 
 /// What a call in place of the running function has come to.
 pub(crate) struct Replaced {
@@ -317,35 +303,6 @@ impl Translator<'_, '_> {
         self.refuse(outcome, signal);
         self.reload(window, want.registers());
         self.check_guess(window);
-    }
-
-    /// Calls a builtin of hash tables, by a function of the machine that does it at once if it can.
-    pub(crate) fn lookup(&mut self, window: u8, count: u8, helper: usize) {
-        self.put_back();
-        self.tick();
-        let (context, helper) = (self.context, self.load_context(helper));
-        let mut arguments = vec![context];
-        for i in 0..4 {
-            let nothing = Value::NIL;
-            arguments.push(if i < count { self.get(window + 2 + i) } else { self.constant_value(nothing) });
-        }
-        let call = self.b.ins().call_indirect(self.lookup_signature, helper, &arguments);
-        let found = self.b.inst_results(call)[0];
-        let (slow, (done, value)) = (self.cold_block(), self.block_with_value());
-        let is_more = self.equals(found, Value::UNBOUND.bits());
-        self.refuse(is_more, slow);
-        self.jump_with(done, found);
-
-        self.go_to(slow);
-        let outcome = self.call_helper(offset_of!(NativeContext, call_builtin));
-        let signal = self.signal();
-        self.refuse(outcome, signal);
-        let base = self.base;
-        let found = self.load(base, i32::from(window) * WORD);
-        self.jump_with(done, found);
-
-        self.go_to(done);
-        self.set(window, value, Known::Nothing);
     }
 
     pub(crate) fn tail_call_builtin(&mut self) {

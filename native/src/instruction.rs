@@ -13,10 +13,10 @@ use esl_heap::heap::layout::{Boxed, Cons};
 
 use crate::abi::NativeContext;
 use crate::arithmetic::{Arithmetic, NumberOrder};
-use crate::calls::lookup_of;
 use crate::emit::in_object;
 use crate::flow::{FlowStep, FrameChange};
 use crate::kinds::{Known, is_root};
+use crate::lookups::TableOperation;
 use crate::objects::{ElementIndex, capture};
 use crate::translate::Translator;
 
@@ -305,8 +305,8 @@ impl Translator<'_, '_> {
             Instr::CallSelf { window, want, .. } => self.call_self(window.0, want, step.next),
             Instr::CallBuiltin { window, .. } if is_root(&step.instr, &self.known) => self.root(window.0),
             Instr::CallBuiltin { window, count, want: Want::ONE, builtin } => {
-                match lookup_of(builtin.0, count.0) {
-                    Some(helper) => self.lookup(window.0, count.0, helper),
+                match TableOperation::of(builtin.0, count.0) {
+                    Some(operation) => self.lookup(window.0, count.0, operation),
                     None => self.call_builtin(window.0, Want::ONE),
                 }
             }

@@ -48,6 +48,7 @@ pub mod helper;
 mod inlined;
 mod instruction;
 mod kinds;
+mod lookups;
 pub mod maker;
 mod objects;
 mod places;

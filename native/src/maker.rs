@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use cranelift_codegen::CodegenError;
 use cranelift_codegen::ir::{AbiParam, Signature, types};
 use cranelift_codegen::isa::{OwnedTargetIsa, TargetIsa};
 use cranelift_codegen::settings::{self, Configurable};
@@ -139,6 +140,10 @@ impl MachineCodeMaker {
             // SAFETY: nobody has an address of it. Dropped, it would keep its memory.
             unsafe { module.free_memory() };
             return Err(match error {
+                ModuleError::Compilation(CodegenError::Verifier(faults)) => {
+                    debug_assert!(false, "a faulty translation: {faults}");
+                    NotMade::Unfit
+                }
                 // Of this function only.
                 ModuleError::Compilation(_) => NotMade::Unfit,
                 error => unsupported(error),

@@ -20,6 +20,7 @@ const _: () = assert!(STEPS_FOR_NOTHING <= ELEMENTS);
 ///
 /// One word, so that the interpreter finds out by one test after each builtin whether there is anything to
 /// see to.
+#[repr(transparent)]
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Charges(u64);
 

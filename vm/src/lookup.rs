@@ -6,7 +6,7 @@
 
 use crate::equality::{self, KeyTest};
 use crate::heap::Heap;
-use crate::table::{KeyComparison, Table, Trouble};
+use crate::table::{KeyComparison, LastLookup, Table, Trouble};
 use crate::value::Value;
 
 /// Most steps of a search; what takes more is left to ESL.
@@ -21,6 +21,14 @@ pub(crate) struct Lookup {
     /// Steps that it has taken.
     pub(crate) steps: usize,
     way: Way,
+}
+
+impl Lookup {
+    /// The search that was not needed, since the last one told the entry.
+    #[inline(always)]
+    fn by_last(entry: usize, value: Value) -> Lookup {
+        Lookup { place: KeyPlace::Entry(entry, value), steps: 0, way: Way::Last }
+    }
 }
 
 /// Outcome of a search.
@@ -46,7 +54,7 @@ enum Way {
 #[derive(Debug, Default)]
 pub(crate) struct Lookups {
     /// The entry found last.
-    last: LastLookup,
+    pub(crate) last: LastLookup,
     /// Entries found before.
     entries: FoundEntries,
 }
@@ -81,8 +89,8 @@ impl Lookups {
         match table.comparison(heap) {
             KeyComparison::Program => Err(Trouble::Slowly),
             KeyComparison::Native(KeyTest::Equalp) => self.locate_other(heap, table, key),
-            KeyComparison::Native(_) => match self.last.place(heap, table, key) {
-                Some(place) => Ok(Lookup { place, steps: 0, way: Way::Last }),
+            KeyComparison::Native(_) => match self.last.find(heap, table, key) {
+                Some((entry, value)) => Ok(Lookup::by_last(entry, value)),
                 // A fixnum is the same as itself alone, and needs no better guess than its hash.
                 None => search(heap, table, KeyTest::Eq, key, equality::fixnum_hash(n), Way::Guess),
             },
@@ -93,8 +101,8 @@ impl Lookups {
     #[inline(never)]
     pub(crate) fn locate_other(&self, heap: &Heap, table: Table, key: Value) -> Result<Lookup, Trouble> {
         let KeyComparison::Native(test) = table.comparison(heap) else { return Err(Trouble::Slowly) };
-        if let Some(place) = self.last.place(heap, table, key) {
-            return Ok(Lookup { place, steps: 0, way: Way::Last });
+        if let Some((entry, value)) = self.last.find(heap, table, key) {
+            return Ok(Lookup::by_last(entry, value));
         }
         if let Some(entry) = self.entries.guess(key, table.value(), table.serial(heap))
             && let Some(value) = table.value_of(heap, entry, key)
@@ -138,54 +146,6 @@ fn search(
         None => KeyPlace::None(hash),
     };
     Ok(Lookup { place, steps: MOST_STEPS - left, way })
-}
-
-/// The entry that was found last in a hash table, by which the next one is guessed.
-///
-/// A key is often the one that was looked up last, as in `(push item (gethash key table))`. And keys that are
-/// integers were often entered in order: their entries lie at one distance from them.
-#[derive(Clone, Copy, Debug)]
-struct LastLookup {
-    key: Value,
-    entry: usize,
-    /// Number of the entry, minus the key if that is an integer.
-    distance: i64,
-    /// Whether the search before led to an entry at the same distance.
-    is_steady: bool,
-}
-
-impl Default for LastLookup {
-    fn default() -> LastLookup {
-        LastLookup { key: Value::UNBOUND, entry: 0, distance: 0, is_steady: false }
-    }
-}
-
-impl LastLookup {
-    /// Returns the place of a key, if the guess is right.
-    #[inline(always)]
-    fn place(&self, heap: &Heap, table: Table, key: Value) -> Option<KeyPlace> {
-        let entry = self.guess(key)?;
-        let value = table.value_of(heap, entry, key)?;
-        Some(KeyPlace::Entry(entry, value))
-    }
-
-    /// Returns the number of the entry that probably has `key`.
-    #[inline(always)]
-    fn guess(&self, key: Value) -> Option<usize> {
-        if self.is_steady
-            && let Some(n) = key.as_fixnum()
-        {
-            return Some((n + self.distance) as usize);
-        }
-        if self.key == key { Some(self.entry) } else { None }
-    }
-
-    /// Notes that a search for `key` led to `entry`.
-    #[inline(always)]
-    fn note(&mut self, key: Value, entry: usize) {
-        let distance = entry as i64 - key.as_fixnum().unwrap_or(0);
-        *self = LastLookup { key, entry, distance, is_steady: distance == self.distance };
-    }
 }
 
 /// The entries that searches for keys other than integers have lately led to, by which later ones for the

@@ -28,7 +28,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 ";
 
 /// Name and text of each.
-const CASES: [(&str, &str); 9] = [
+const CASES: [(&str, &str); 10] = [
     (
         "doubles that become something else in a loop",
         "(defun run (x y n)
@@ -84,6 +84,29 @@ const CASES: [(&str, &str); 9] = [
          (print (scale (of 1 2 3) 2.0)) (print (scale (of 1/2 1.0 3) 3))
          (print (handler-case (scale (of 1.0 :x 2.0) 2.0) (error (e) (type-of e))))
          (print (handler-case (scale (list 1.0) 2.0) (error (e) (type-of e))))",
+    ),
+    (
+        "hash tables that are changed while objects are marked",
+        "(defun fill-up (table n)
+           (dotimes (i n) (setf (gethash i table) (list i (* i 0.5) (format nil \"~d\" i)))))
+         (defun move (table n)
+           (let ((kept nil))
+             (dotimes (i n kept)
+               (let ((key (- n i 1)))
+                 (push (gethash key table) kept)
+                 (setf (gethash key table) key)
+                 (incf (gethash key table) 7)))))
+         (defun check (table kept n)
+           (let ((wrong 0))
+             (dotimes (i n wrong)
+               (let ((item (pop kept)))
+                 (unless (and (eql (first item) i) (= (second item) (* i 0.5)) (eql (+ i 7) (gethash i table))
+                              (string= (third item) (format nil \"~d\" i)))
+                   (incf wrong))))))
+         (dotimes (k 12)
+           (let ((table (make-hash-table)) (n (+ 3000 (* 500 k))))
+             (fill-up table n)
+             (print (check table (move table n) n))))",
     ),
     (
         "loads among operations on doubles",

@@ -420,6 +420,23 @@ pub struct HashTable {
 
 const _: () = assert!(size_of::<HashTable>() == 80);
 
+impl HashTable {
+    /// Binary logarithm of the number of entries of a segment.
+    pub const SEGMENT_SHIFT: u32 = if cfg!(miri) { 4 } else { 12 };
+    /// Number of values of an entry in its segment: key, value, link.
+    pub const ENTRY: usize = 3;
+    /// Number of chains for each entry. With one, a search for a missing key would meet one entry on the
+    /// average; with two it meets half of one.
+    pub const PER_ENTRY: usize = 2;
+    /// Greatest number of entries of a table; such a table takes 10 GB.
+    pub const MOST: usize = (1 << 28) - (1 << HashTable::SEGMENT_SHIFT);
+    /// Number of bits of a link for the number of an entry. Above them a link has the hash of the key, below
+    /// them one bit.
+    pub const NUMBER_BITS: u32 = HashTable::MOST.ilog2() + 1;
+    /// Greatest number of a test by which an integer is the same as itself alone: `eq`, `eql`, `equal`.
+    pub const BY_VALUE: u16 = 2;
+}
+
 /// An instance of a structure.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]

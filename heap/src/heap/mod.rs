@@ -330,6 +330,11 @@ impl Heap {
         self.due
     }
 
+    /// Returns where machine code finds what [`Heap::gc_due`] returns.
+    pub fn gc_due_at(&self) -> *const bool {
+        &raw const self.due
+    }
+
     /// Returns the state of the collector.
     pub fn phase(&self) -> Phase {
         self.phase

@@ -18,17 +18,20 @@
 //! buckets, for the sake of their order.
 
 use crate::equality::{self, KeyTest};
+use crate::heap::layout::HashTable;
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
-use storage::{Counter, ENTRY, MOST, PER_ENTRY, SEGMENT, Storage};
+use storage::{Counter, ENTRY, PER_ENTRY, SEGMENT, Storage};
 
+mod last;
 mod storage;
+
+pub use last::LastLookup;
 
 /// Room of a new table, in entries, at least.
 const LEAST: usize = 8;
 
-/// Number of bits of a link for the number of an entry.
-const NUMBER_BITS: u32 = MOST.ilog2() + 1;
+const NUMBER_BITS: u32 = HashTable::NUMBER_BITS;
 
 /// Link to an entry.
 #[derive(Clone, Copy, PartialEq, Eq)]

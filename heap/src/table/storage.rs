@@ -26,14 +26,10 @@ use crate::value::Value;
 
 /// Number of entries of a segment.
 pub(super) const SEGMENT: usize = 1 << SHIFT;
-const SHIFT: usize = if cfg!(miri) { 4 } else { 12 };
-/// Number of chains for each entry. With one, a search for a missing key would meet one entry on the average;
-/// with two it meets half of one.
-pub(super) const PER_ENTRY: usize = 2;
-/// Number of values of an entry in its segment: key, value, link.
-pub(super) const ENTRY: usize = 3;
-/// Greatest number of entries of a table; such a table takes 10 GB.
-pub(super) const MOST: usize = (1 << 28) - SEGMENT;
+const SHIFT: u32 = HashTable::SEGMENT_SHIFT;
+pub(super) const PER_ENTRY: usize = HashTable::PER_ENTRY;
+pub(super) const ENTRY: usize = HashTable::ENTRY;
+const MOST: usize = HashTable::MOST;
 
 /// Content of a free entry in place of a key: no program has it.
 const FREE: Value = Value::UNBOUND;

@@ -1,6 +1,7 @@
 //! Suggestions for misspelt names.
 
 use esl_bytecode::builtin::BUILTINS;
+use esl_bytecode::package::{PackageId, Qualifier};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
 use crate::heap::layout::SymbolObject;
@@ -18,12 +19,19 @@ pub(super) fn similar(vm: &Vm, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
         6..=9 => 2,
         _ => 3,
     };
+    let home = symbol.package().and_then(|name| vm.world.packages.named(name)).unwrap_or(PackageId::USER);
+    let is_accessible = |candidate: &Symbol| {
+        candidate.package() == symbol.package()
+            || !matches!(vm.world.packages.qualifier(candidate, home), Qualifier::Internal(_))
+    };
     let mut found: Vec<(usize, Symbol)> = Vec::new();
     let mut consider = |candidate: &Symbol| {
         if candidate == symbol || candidate.name().starts_with('%') || candidate.name().starts_with('(') {
             return;
         }
-        if let Some(distance) = distance(symbol.name(), candidate.name(), limit) {
+        if is_accessible(candidate)
+            && let Some(distance) = distance(symbol.name(), candidate.name(), limit)
+        {
             let entry = (distance, candidate.clone());
             if !found.iter().any(|(_, other)| other == candidate) {
                 found.push(entry);
