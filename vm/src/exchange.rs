@@ -6,6 +6,7 @@
 
 use crate::heap::Heap;
 use crate::lookup::{Lookup, Lookups, STEPS_FOR_NOTHING};
+use crate::overhead::CollectionOverhead;
 use crate::raise::{Arguments, Exit, Expected, Raised};
 use crate::saved_pc::SavedPc;
 use crate::table::Table;
@@ -77,6 +78,8 @@ pub(crate) struct Exchange {
     pub(crate) charges: Charges,
     /// Place and time of the last collection for want of room; a second one there would not help.
     pub(crate) collected_at: Option<(SavedPc, u64, i32)>,
+    /// The overhead of collections for want of room.
+    pub(crate) overhead: CollectionOverhead,
 }
 
 impl Exchange {
@@ -89,6 +92,7 @@ impl Exchange {
             lookups: Lookups::default(),
             charges: Charges::default(),
             collected_at: None,
+            overhead: CollectionOverhead::default(),
         }
     }
 

@@ -41,6 +41,7 @@ mod interp;
 mod lookup;
 mod number;
 mod outside;
+mod overhead;
 mod report;
 mod shape;
 mod shared;

@@ -23,6 +23,7 @@ use crate::heap::HeapImage;
 use crate::host::{Console, HostState};
 use crate::lookup::Lookups;
 use crate::outside::{Operations, Outside};
+use crate::overhead::CollectionOverhead;
 use crate::saved_pc::SavedPc;
 use crate::schedule::Scheduler;
 use crate::trust;
@@ -61,6 +62,7 @@ struct SavedExchange {
     values: Vec<Value>,
     lookups: Lookups,
     collected_at: Option<(SavedPc, u64, i32)>,
+    overhead: CollectionOverhead,
 }
 
 impl Snapshot {
@@ -120,7 +122,8 @@ impl Vm {
         if !rests {
             return None;
         }
-        let Exchange { values, raised: _, requested_call: _, lookups, charges: _, collected_at } = exchange;
+        let Exchange { values, raised: _, requested_call: _, lookups, charges: _, collected_at, overhead } =
+            exchange;
         let database = database.copy()?;
         let host = host.save_all()?;
         Some(Snapshot {
@@ -142,6 +145,7 @@ impl Vm {
                 values: values.clone(),
                 lookups: lookups.saved(),
                 collected_at: *collected_at,
+                overhead: *overhead,
             },
             embedder: embedder.clone(),
             config: config.clone(),
@@ -183,6 +187,7 @@ impl Vm {
             lookups: exchange.lookups.saved(),
             charges: Charges::default(),
             collected_at: exchange.collected_at,
+            overhead: exchange.overhead,
         };
         self.embedder = embedder.clone();
         self.config = config.clone();

@@ -29,6 +29,7 @@ use crate::exchange::Exchange;
 use crate::host::Incoming;
 use crate::observe::{Figures, Journal, Observers, Watch};
 use crate::outside::{Operations, Outside};
+use crate::overhead::CollectionOverhead;
 use crate::schedule::{Accounts, Clock, Counts, EndOfAll, Points, RunQueues, Scheduler, Timers, Turn};
 use crate::task::{Control, Extra, RunningCleanup, Shortage, Task};
 use crate::value::Value;
@@ -240,6 +241,9 @@ list_state! { Exchange {
     lookups: Derived,
     charges: Derived,
     collected_at: Derived,
+    overhead: Run by |overhead: &CollectionOverhead, sink: &mut dyn StateSink| {
+        overhead.words().into_iter().for_each(|word| sink.word(word));
+    },
 } }
 list_state! { Embedder {
     pinned: Run,

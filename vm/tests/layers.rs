@@ -30,6 +30,7 @@ const LAYERS: &[&str] = &[
     "wait",
     "outside",
     "lookup",
+    "overhead",
     "exchange",
     "schedule",
     "observe",

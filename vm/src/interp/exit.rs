@@ -85,7 +85,8 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
 }
 
 /// Has the instruction at `vm.cpu.pc()` done again: in the task's next turn, where there is room for it or
-/// not yet, and then after a collection. If that did not help, the heap is exhausted.
+/// not yet, and then after a collection. If that did not help, or collections have lately taken more time
+/// than they were worth, the heap is exhausted.
 ///
 /// # Safety
 /// The contract of [`super::settle`].
@@ -117,13 +118,19 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         vm.scheduler.turn.end_with(TurnEnd::Passed);
         return Signal::Again;
     }
+    if vm.exchange.overhead.is_too_much(vm.scheduler.spent) {
+        return run_out(vm, is_call, false);
+    }
     vm.exchange.collected_at = Some(place);
     vm.collect_fully();
+    let seen = vm.heap.stats().live + vm.heap.external() as u64;
+    let (now, took) = (vm.scheduler.spent, seen / BYTES_PER_TICK);
+    vm.exchange.overhead.note(now, took, vm.heap.room_left(), vm.config.memory);
     Signal::Reload
 }
 
 /// Deals with an instruction for which there is no room although everything has been collected, in this turn
-/// or since the last one.
+/// or since the last one, or so often that no more time is to go into that.
 fn run_out(vm: &mut Vm, is_call: bool, has_collected: bool) -> Signal {
     if vm.open_cleanup_memory() {
         return Signal::Reload;
