@@ -102,6 +102,21 @@ fn portions_of_a_fixed_length_change_nothing() {
     }
 }
 
+/// Tasks that fork until there is no room have everything collected now and then, not at each failure.
+#[test]
+fn collections_near_the_limit_are_few() {
+    let text = "(defun fork () (task-net (a (fork)) (b (fork)))) (fork)";
+    let config = Config { memory: 24 << 20, budget: Some(400_000), ..Config::default() };
+    check(text, &config, &[701, 1999]);
+    let program = program::compile(&[Source::new("near", text)]).program.expect("it compiles");
+    let mut machine =
+        program::machine(config, Box::new(VirtualHost::new())).expect("there is room for the library");
+    program::begin(&mut machine, &program).expect("it can start");
+    while machine.run(u64::MAX) == RunOutcome::TicksUsed {}
+    let cycles = machine.heap_stats().cycles;
+    assert!(cycles > 10 && cycles < 100, "{cycles} cycles in {} ticks", machine.ticks());
+}
+
 /// Two machines have their objects at other addresses. The collector's marks and what it has yet to follow
 /// are state, too, and are looked at while it works: among classes, and in compilations.
 #[test]

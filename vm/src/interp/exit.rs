@@ -118,14 +118,14 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         vm.scheduler.turn.end_with(TurnEnd::Passed);
         return Signal::Again;
     }
-    if vm.exchange.overhead.is_too_much(vm.scheduler.spent) {
+    let now = vm.scheduler.spent + vm.cpu.used();
+    if vm.exchange.overhead.is_too_much(now) {
         return run_out(vm, is_call, false);
     }
     vm.exchange.collected_at = Some(place);
     vm.collect_fully();
     let seen = vm.heap.stats().live + vm.heap.external() as u64;
-    let (now, took) = (vm.scheduler.spent, seen / BYTES_PER_TICK);
-    vm.exchange.overhead.note(now, took, vm.heap.room_left(), vm.config.memory);
+    vm.exchange.overhead.note(now, seen / BYTES_PER_TICK, vm.heap.room_left(), vm.config.memory);
     Signal::Reload
 }
 
