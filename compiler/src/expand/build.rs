@@ -192,7 +192,7 @@ impl Expander {
         let level = self.level();
         let functions = self.objects.split_off(self.objects.len() - names.len());
         for (name, function) in names.into_iter().zip(functions) {
-            self.scope.enter(ScopeEntry::Function(name, FunctionMeaning::Macro(function)), level);
+            self.scope.enter(ScopeEntry::Function(name, FunctionMeaning::Macro(function)), level, false);
         }
     }
 }

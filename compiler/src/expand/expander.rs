@@ -240,7 +240,8 @@ impl Expander {
             Job::Enter(entries) => {
                 let level = self.level();
                 for entry in entries {
-                    self.scope.enter(entry, level);
+                    let hides = entry.hides_symbol_macro(environment);
+                    self.scope.enter(entry, level, hides);
                 }
             }
             Job::Leave(count) => {

@@ -9,7 +9,7 @@
 //! see [`Visible::OutOfReach`].
 
 use esl_bytecode::BigInt;
-use esl_bytecode::compile::Arity;
+use esl_bytecode::compile::{Arity, Environment};
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
 use esl_bytecode::locals::{LocalMeaning, Locals};
 use esl_bytecode::span::Span;
@@ -74,6 +74,22 @@ pub(super) enum ScopeEntry {
     Written(Symbol, bool),
 }
 
+impl ScopeEntry {
+    /// Returns whether this is a variable with the name of a global symbol macro.
+    pub(super) fn hides_symbol_macro(&self, environment: &dyn Environment) -> bool {
+        match self {
+            ScopeEntry::Variable(_, VariableMeaning::SymbolMacro(_), _) => false,
+            ScopeEntry::Variable(name, ..) => global_symbol_macro(environment, name).is_some(),
+            _ => false,
+        }
+    }
+}
+
+/// Returns the form that `symbol` stands for by `define-symbol-macro`.
+pub(super) fn global_symbol_macro(environment: &dyn Environment, symbol: &Symbol) -> Option<Datum> {
+    environment.property(symbol, &Symbol::esl("%SYMBOL-MACRO"))
+}
+
 /// A lexical variable that has gone out of scope, to be reported if it is unused.
 #[derive(Debug)]
 pub(super) struct Gone {
@@ -103,7 +119,8 @@ struct Held<T> {
 /// Meaning that an entry replaced.
 #[derive(Debug)]
 enum Undo {
-    Variable(Symbol, Option<Held<VariableMeaning>>, Option<Span>),
+    /// Also, whether macros may ask for the entry.
+    Variable(Symbol, Option<Held<VariableMeaning>>, Option<Span>, bool),
     Function(Symbol, Option<Held<FunctionMeaning>>),
     Block(Symbol, Option<Held<BlockId>>),
     Tag(Tag, Option<Held<(TagbodyId, u32)>>),
@@ -125,19 +142,20 @@ pub(super) struct Scope {
 }
 
 impl Scope {
-    /// Enters a name, in code of chunk level `level`.
-    pub(super) fn enter(&mut self, entry: ScopeEntry, level: usize) {
+    /// Enters a name, in code of chunk level `level`. `hides` is what [`ScopeEntry::hides_symbol_macro`] says.
+    pub(super) fn enter(&mut self, entry: ScopeEntry, level: usize, hides: bool) {
         let undo = match entry {
             ScopeEntry::Variable(name, meaning, report) => {
                 let told = match &meaning {
                     VariableMeaning::SymbolMacro(form) => Some(LocalMeaning::SymbolMacro(form.clone())),
-                    _ => self.is_symbol_macro(&name).then_some(LocalMeaning::Variable),
+                    _ => (hides || self.is_symbol_macro(&name)).then_some(LocalMeaning::Variable),
                 };
+                let is_told = told.is_some();
                 if let Some(told) = told {
                     self.locals = self.locals.with(name.clone(), told);
                 }
                 let old = self.variables.insert(name.clone(), Held { meaning, level });
-                Undo::Variable(name, old, report)
+                Undo::Variable(name, old, report, is_told)
             }
             ScopeEntry::Function(name, meaning) => {
                 let told = match &meaning {
@@ -167,10 +185,9 @@ impl Scope {
     /// Takes the newest entry out of the scope.
     pub(super) fn leave(&mut self) -> Option<Gone> {
         match self.log.pop()? {
-            Undo::Variable(name, old, report) => {
+            Undo::Variable(name, old, report, is_told) => {
                 let gone = restore(&mut self.variables, &name, old);
-                let is_told = |held: &Held<_>| matches!(held.meaning, VariableMeaning::SymbolMacro(_));
-                if gone.as_ref().is_some_and(is_told) || self.is_symbol_macro(&name) {
+                if is_told {
                     self.leave_local();
                 }
                 match (gone.map(|held| held.meaning), report) {

@@ -10,7 +10,7 @@ use super::expander::Expander;
 use super::form::{Checked, Form, Make, fresh, is_known, name};
 use super::job::{Job, To};
 use super::origin::OriginId;
-use super::scope::{VariableMeaning, Visible};
+use super::scope::{VariableMeaning, Visible, global_symbol_macro};
 use crate::core::NodeKind;
 use crate::diagnostic::code;
 
@@ -53,8 +53,7 @@ impl Expander {
         Ok(match environment.global(symbol).variable {
             GlobalVariable::Special => Some(Meaning::Variable(VariableMeaning::Special)),
             GlobalVariable::Constant(value) => Some(Meaning::Constant(value)),
-            GlobalVariable::Undefined => environment
-                .property(symbol, &Symbol::esl("%SYMBOL-MACRO"))
+            GlobalVariable::Undefined => global_symbol_macro(environment, symbol)
                 .map(|form| Meaning::Variable(VariableMeaning::SymbolMacro(form))),
         })
     }
