@@ -239,10 +239,7 @@ impl Expander {
             }
             Job::Enter(entries) => {
                 let level = self.level();
-                for entry in entries {
-                    let hides = entry.hides_symbol_macro(environment);
-                    self.scope.enter(entry, level, hides);
-                }
+                self.scope.enter_all(entries, level, environment);
             }
             Job::Leave(count) => {
                 if count > NAMES_AT_ONCE {

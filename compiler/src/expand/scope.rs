@@ -76,7 +76,7 @@ pub(super) enum ScopeEntry {
 
 impl ScopeEntry {
     /// Returns whether this is a variable with the name of a global symbol macro.
-    pub(super) fn hides_symbol_macro(&self, environment: &dyn Environment) -> bool {
+    fn hides_symbol_macro(&self, environment: &dyn Environment) -> bool {
         match self {
             ScopeEntry::Variable(_, VariableMeaning::SymbolMacro(_), _) => false,
             ScopeEntry::Variable(name, ..) => global_symbol_macro(environment, name).is_some(),
@@ -142,7 +142,21 @@ pub(super) struct Scope {
 }
 
 impl Scope {
-    /// Enters a name, in code of chunk level `level`. `hides` is what [`ScopeEntry::hides_symbol_macro`] says.
+    /// Enters names, in code of chunk level `level`.
+    pub(super) fn enter_all(
+        &mut self,
+        entries: Vec<ScopeEntry>,
+        level: usize,
+        environment: &dyn Environment,
+    ) {
+        for entry in entries {
+            let hides = entry.hides_symbol_macro(environment);
+            self.enter(entry, level, hides);
+        }
+    }
+
+    /// Enters a name, in code of chunk level `level`. `hides` is what [`ScopeEntry::hides_symbol_macro`]
+    /// says.
     pub(super) fn enter(&mut self, entry: ScopeEntry, level: usize, hides: bool) {
         let undo = match entry {
             ScopeEntry::Variable(name, meaning, report) => {
