@@ -87,12 +87,6 @@ impl Heap {
         self.limit_now().saturating_sub(self.taken())
     }
 
-    /// Returns the number of bytes that the last collection has left free, in holes too, less what the memory
-    /// outside of the heap has grown by since. To be called right after a collection.
-    pub fn room_left(&self) -> usize {
-        self.limit.saturating_sub(self.stats().live as usize).saturating_sub(self.external.total)
-    }
-
     /// Returns the number of bytes outside of the heap that count against its limit.
     pub fn external(&self) -> usize {
         self.external.total

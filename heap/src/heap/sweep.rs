@@ -21,10 +21,9 @@ const BYTES_PER_VISIT: usize = 256;
 const FREE_PIECE: usize = 64 << 10;
 /// Least allocation, in bytes, between two cycles, however close the limit is.
 const LEAST_THRESHOLD: u64 = 256 << 10;
-/// Part of the limit, one in so many, that has to be free for cycles to be of use near it.
-const HOPELESS: u64 = 64;
-/// Least allocation between two cycles where they are not: of what they go over, one part in so many.
-const WORTH: u64 = 16;
+/// Least allocation between two cycles, as a part of what they go over, one in so many: below that they would
+/// take all the time, and who finds no room had better wait for one.
+const WORTH: u64 = 32;
 
 /// Progress of the sweep.
 #[derive(Clone, Copy, Default)]
@@ -51,13 +50,11 @@ impl Heap {
         self.sweep = Sweep { at: (0, 1), large: self.large.len(), spares: 0, live: 0 };
         // Most objects allocated during the cycle are garbage: they count as live here, but do not put off
         // the next cycle.
-        let room = (self.limit as u64).saturating_sub(self.stats.live + self.external.total as u64);
+        let room = (self.limit as u64).saturating_sub(self.stats.live + self.external.total as u64) / 2;
         // A cycle goes over the stacks of all tasks, too.
         let live = self.marker.bytes + self.external.of_tasks() as u64;
-        // With hardly any room, cycles would end too late and take all the time.
-        let is_hopeless = room < self.limit as u64 / HOPELESS;
-        let least = if is_hopeless { LEAST_THRESHOLD.max(live / WORTH) } else { LEAST_THRESHOLD };
-        self.pacing.threshold = live.max(self.pacing.floor).min(least.max(room / 2));
+        let least = LEAST_THRESHOLD.max(live / WORTH);
+        self.pacing.threshold = live.max(self.pacing.floor).min(room.max(least));
         self.pacing.since_cycle = 0;
         self.pacing.owed = 0;
         self.due = false;

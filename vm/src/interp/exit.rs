@@ -8,6 +8,7 @@ use super::call::{FramePlace, call, call_requested};
 use super::{Signal, aux_at, failure, word_at};
 use crate::describe::describe;
 use crate::host::Host;
+use crate::overhead::CollectionPoint;
 use crate::raise::{Exit, Raised};
 use crate::saved_pc::SavedPc;
 use crate::schedule::TurnEnd;
@@ -118,14 +119,18 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         vm.scheduler.turn.end_with(TurnEnd::Passed);
         return Signal::Again;
     }
-    let now = vm.scheduler.spent + vm.cpu.used();
+    let now = CollectionPoint {
+        ticks: vm.scheduler.spent + vm.cpu.used(),
+        allocated: vm.heap.stats().allocated,
+        limit: vm.config.memory as u64,
+    };
     if vm.exchange.overhead.is_too_much(now) {
         return run_out(vm, is_call, false);
     }
     vm.exchange.collected_at = Some(place);
     vm.collect_fully();
     let seen = vm.heap.stats().live + vm.heap.external() as u64;
-    vm.exchange.overhead.note(now, seen / BYTES_PER_TICK, vm.heap.room_left(), vm.config.memory);
+    vm.exchange.overhead.note(now, seen / BYTES_PER_TICK);
     Signal::Reload
 }
 
