@@ -169,7 +169,7 @@ const HASHED_PARTS: usize = 64;
 /// Number of characters of a string that its hash looks at.
 const HASHED_CHARACTERS: usize = 4096;
 
-/// By what [`mix`] multiplies.
+/// The factor by which words are mixed into a hash.
 pub const HASH_FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// Mixes a word into a hash.
