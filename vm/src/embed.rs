@@ -19,6 +19,7 @@ use crate::host::{Host, Inbox, Incoming, Output, ProcessSignal};
 use crate::interp::start::make_starter;
 use crate::observe::Watch;
 use crate::outside::{Given, Outside};
+use crate::overhead::CollectionOverhead;
 use crate::raise::Exit;
 use crate::schedule::{Choices, Clock, Scheduler};
 use crate::task::TaskId;
@@ -248,6 +249,7 @@ impl Vm {
             (None, None, 0);
         self.scheduler.choices = Choices::seeded(self.config.seed);
         self.scheduler.spent = 0;
+        self.exchange.overhead = CollectionOverhead::default();
         self.scheduler.canary = Canary::default();
         (
             self.scheduler.clock.looked_at,

@@ -51,6 +51,11 @@ impl CollectionOverhead {
         };
     }
 
+    /// Allows another collection: an exhaustion has been handled, and much may have been let go.
+    pub(crate) fn allow_another(&mut self) {
+        self.owed = self.owed.min((ALLOWED - 1) * self.last);
+    }
+
     fn owed_at(&self, now: CollectionPoint) -> u64 {
         let (ran, gained) = (now.ticks.saturating_sub(self.at), now.allocated.saturating_sub(self.allocated));
         let part = (now.limit / PART_OF_LIMIT).max(1);
@@ -84,6 +89,21 @@ mod tests {
         assert!(!overhead.is_too_much(point(6, 0)));
         overhead.note(point(1005, 0), 1000);
         assert!(overhead.is_too_much(point(1005, 0)) && !overhead.is_too_much(point(1006, 0)));
+    }
+
+    #[test]
+    fn handling_an_exhaustion_allows_one_collection() {
+        let mut overhead = CollectionOverhead::default();
+        overhead.allow_another();
+        assert_eq!(overhead, CollectionOverhead::default());
+        for _ in 0..2 * ALLOWED {
+            overhead.note(point(5, 0), 1000);
+        }
+        assert!(overhead.is_too_much(point(5, 0)));
+        overhead.allow_another();
+        assert!(!overhead.is_too_much(point(5, 0)));
+        overhead.note(point(5, 0), 1000);
+        assert!(overhead.is_too_much(point(5, 0)));
     }
 
     #[test]

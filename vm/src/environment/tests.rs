@@ -107,6 +107,8 @@ fn a_compiler_learns_what_names_mean() {
         assert_eq!(car, GlobalFunction::Function(Some(Arity { min: 1, max: Some(1) })));
         assert!(matches!(vm.setf_function(&Symbol::cl("CAR")), GlobalFunction::Undefined));
         assert_eq!(vm.similar(&Symbol::esl("QUOTTED"), false), [Symbol::esl("QUOTED")]);
+        let foreign = Symbol::new(&esl_bytecode::symbol::USER_PACKAGE.into(), "QUOTTED");
+        assert_eq!(vm.similar(&foreign, false), [], "a program cannot use an internal name");
         assert_eq!(
             vm.similar(&Symbol::esl("LIMITS"), true).len(),
             usize::from(vm.world.find(&Symbol::esl("LIMIT")).is_some())

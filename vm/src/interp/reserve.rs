@@ -137,7 +137,10 @@ impl Vm {
     /// Closes the reserves of stack and heap once the handling of their exhaustion is over: an unwinding has
     /// landed.
     pub(super) fn close_reserves(&mut self) {
-        self.heap.close_reserve();
+        if self.heap.is_reserve_open() {
+            self.heap.close_reserve();
+            self.exchange.overhead.allow_another();
+        }
         if self.scheduler.task().flags.uses_reserve()
             && self.offset_of(self.cpu.base()) < self.config.stack_words() / 2
         {
