@@ -226,6 +226,7 @@ list_state! { Points { grain: Process, is_open: Run, has_shown: Run, asked: Run,
 list_state! { Turn {
     index: Run,
     end: Derived,
+    left: Run,
     critical_left: Run,
     critical_is_new: Run,
     had_attention: Derived,

@@ -382,9 +382,11 @@ pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn end_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    let is_turn_spent = vm.scheduler.turn.is_spent();
     let task = vm.scheduler.task_mut();
     task.critical = task.critical.saturating_sub(1);
-    if task.critical == 0 && task.flags.attention() {
+    // Others wait for the end of a section that goes beyond its turn.
+    if task.critical == 0 && (task.flags.attention() || is_turn_spent) {
         vm.exchange.charges.end_slice();
     }
     Ok(Value::NIL)

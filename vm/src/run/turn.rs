@@ -16,9 +16,17 @@ use crate::schedule::{Due, Measure, OpenSlice, OpenTurn, Parking, TurnEnd};
 use crate::task::{AccountId, Task, TaskIndex, TaskNumber, TaskState};
 use crate::vm::Vm;
 
-/// Gives a runnable task its turn: one slice, or as many as it takes to leave a critical section. `end` is
-/// the number of ticks of the run at which the portion is over; the turn stays open then.
+/// Gives a runnable task its turn: one slice, or its parts where it is cut, and as many more as it takes to
+/// leave a critical section. `end` is the number of ticks of the run at which the portion is over; the turn
+/// stays open then.
 pub(crate) fn give_turn(vm: &mut Vm, index: TaskIndex, end: u64) {
+    vm.scheduler.turn.left = None;
+    run_slices(vm, index, end);
+}
+
+/// Gives a task the slices of its turn that are to come.
+#[inline(always)]
+fn run_slices(vm: &mut Vm, index: TaskIndex, end: u64) {
     while let Some(leave) = run_slice(vm, index, end)
         && goes_on(vm, index, leave, end)
     {}
@@ -37,7 +45,7 @@ pub(crate) fn go_on_with_turn(vm: &mut Vm, turn: OpenTurn, end: u64) {
             return;
         }
     }
-    give_turn(vm, index, end);
+    run_slices(vm, index, end);
 }
 
 /// Does what follows on a slice, and returns whether that is another one in the same turn.
@@ -49,8 +57,9 @@ fn goes_on(vm: &mut Vm, index: TaskIndex, leave: Leave, end: u64) -> bool {
         Leave::Parked => park_task(vm, index),
         Leave::Slice => {
             let Some(task) = scheduler.tasks.at_mut(index) else { return false };
-            let is_cut = task.critical > 0 || scheduler.turn.end == TurnEnd::Cut;
-            if is_cut && !scheduler.is_budget_spent(&vm.config) {
+            let turn = &scheduler.turn;
+            let goes_on = task.critical > 0 || turn.end == TurnEnd::Cut && !turn.is_spent();
+            if goes_on && !scheduler.is_budget_spent(&vm.config) {
                 if scheduler.spent < end {
                     return true;
                 }
@@ -200,6 +209,7 @@ fn end_slice(vm: &mut Vm, slice: OpenSlice, leave: Leave) {
         vm.save_cpu();
         vm.word_of_pc()
     };
+    vm.scheduler.turn.charge(used);
     let task = vm.scheduler.task_mut();
     task.ticks += used;
     let course = task.number.0.rotate_left(40) ^ used.rotate_left(20) ^ word as u64;

@@ -335,9 +335,14 @@ impl Scheduler {
         self.open_turn = self.tasks.id_at(self.turn.index).map(|task| OpenTurn { task, slice });
     }
 
-    /// Returns the length of the next slice of the running task.
+    /// Returns the length of the next slice of the running task: the whole turn, or what is left of it. A
+    /// critical section goes beyond.
     pub(crate) fn slice_length(&mut self, config: &Config) -> u64 {
-        let mut slice = u64::from(self.choices.slice(config.slice));
+        let mut slice = match self.turn.left {
+            None => *self.turn.left.insert(u64::from(self.choices.slice(config.slice))),
+            Some(0) => u64::from(config.slice),
+            Some(left) => left,
+        };
         if let Some(budget) = config.budget {
             slice = slice.min(budget.saturating_sub(self.spent));
         }

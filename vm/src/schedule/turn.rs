@@ -21,7 +21,7 @@ pub(crate) enum TurnEnd {
     #[default]
     Spent,
     /// The slice was cut short, because its length or its account is no longer right: the task goes on with
-    /// another slice.
+    /// another slice, if anything is left of the turn.
     Cut,
     /// The task lets others go first: it goes to the end of its queue.
     Passed,
@@ -36,6 +36,9 @@ pub(crate) struct Turn {
     pub(crate) index: TaskIndex,
     /// Consequence of the present slice.
     pub(crate) end: TurnEnd,
+    /// Ticks left of the turn: those of all its slices together, but for what a critical section takes
+    /// beyond. `None` before the first slice.
+    pub(crate) left: Option<u64>,
     /// Ticks left of the task's critical section.
     pub(crate) critical_left: i64,
     /// Whether its critical section has begun in this slice, whose ticks so far do not count.
@@ -59,6 +62,18 @@ impl Turn {
         self.end = self.end.max(end);
     }
 
+    /// Notes what a slice has used.
+    #[inline]
+    pub(crate) fn charge(&mut self, used: u64) {
+        self.left = self.left.map(|left| left.saturating_sub(used));
+    }
+
+    /// Returns whether nothing was left of the turn at the end of the last slice.
+    #[inline]
+    pub(crate) fn is_spent(&self) -> bool {
+        self.left == Some(0)
+    }
+
     /// Makes up for ticks of this slice that do not count for the critical section.
     pub(crate) fn extend_critical(&mut self, ticks: u64) {
         if !self.critical_is_new {
@@ -72,6 +87,7 @@ impl Default for Turn {
         Turn {
             index: TaskIndex::NONE,
             end: TurnEnd::default(),
+            left: None,
             critical_left: 0,
             critical_is_new: false,
             had_attention: false,
