@@ -48,6 +48,48 @@ fn is_simple(words: &[u32], may_be_there: impl Fn(Opcode) -> bool) -> bool {
     true
 }
 
+/// Most instructions before the return of a short way.
+const SHORT: usize = 4;
+
+/// Returns whether a short way leads from the instruction at a word to a return: past tests of registers, and
+/// what writes constants and registers to others than those of the arguments. What is done on it can be
+/// repeated from the beginning of the function.
+fn returns_soon(words: &[u32], at: usize, arguments: u8, most: usize) -> bool {
+    let Some(instr) = Instr::decode(words, at).filter(|_| most > 0) else { return false };
+    let dst = match instr {
+        Instr::Return { .. } => return true,
+        Instr::Move { dst, .. }
+        | Instr::LoadInt { dst, .. }
+        | Instr::LoadConst { dst, .. }
+        | Instr::LoadTrue { dst } => Some(dst.0),
+        Instr::LoadNil { first, .. } => Some(first.0),
+        Instr::JumpAlways { .. }
+        | Instr::JumpIfNil { .. }
+        | Instr::JumpIfNotNil { .. }
+        | Instr::JumpIfCons { .. }
+        | Instr::JumpIfNotCons { .. }
+        | Instr::JumpEq { .. }
+        | Instr::JumpNotEq { .. }
+        | Instr::JumpNumEq { .. }
+        | Instr::JumpNotNumEq { .. }
+        | Instr::JumpLess { .. }
+        | Instr::JumpNotLess { .. }
+        | Instr::JumpLessEq { .. }
+        | Instr::JumpNotLessEq { .. }
+        | Instr::JumpNumEqInt { .. }
+        | Instr::JumpNotNumEqInt { .. }
+        | Instr::JumpLessInt { .. }
+        | Instr::JumpNotLessInt { .. }
+        | Instr::JumpGreaterInt { .. }
+        | Instr::JumpNotGreaterInt { .. } => None,
+        _ => return false,
+    };
+    let next = at + instr.opcode().words();
+    let ways = instr.opcode().falls_through().then_some(next).into_iter().chain(target_of(&instr, next));
+    dst.is_none_or(|dst| dst >= arguments)
+        && ways.into_iter().any(|to| returns_soon(words, to, arguments, most - 1))
+}
+
 /// How an instruction leads from one frame to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrameChange {
@@ -57,6 +99,9 @@ pub(crate) enum FrameChange {
     Enter { window: u8, count: u8 },
     /// It returns from an inlined function: the value goes to this register.
     Return { to: u8 },
+    /// It is not among the short ways that are inlined of a function: in its place the whole function is
+    /// called, with so many arguments. The value goes to this register.
+    Call { to: u8, count: u8 },
 }
 
 /// An instruction that machine code can reach.
@@ -98,6 +143,8 @@ pub(crate) struct FlowFrame<'a> {
     pub(crate) guard: Option<Value>,
     /// Number of the optional parameters that get no argument.
     pub(crate) unsupplied: u8,
+    /// How much of it is inlined.
+    extent: Extent,
     /// Where an inlined function returns to.
     back: Option<Back>,
 }
@@ -107,6 +154,16 @@ struct InlinedCall<'a> {
     source: &'a FunctionSource,
     guard: Option<Value>,
     unsupplied: u8,
+    extent: Extent,
+}
+
+/// How much of a function is inlined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Extent {
+    /// All of it.
+    Whole,
+    /// The ways on which it returns soon; the function is called where another one begins.
+    ShortWays,
 }
 
 /// Where an inlined function returns to.
@@ -116,6 +173,8 @@ struct Back {
     frame: usize,
     /// The register that gets the value.
     to: u8,
+    /// Number of arguments.
+    count: u8,
     /// The word behind the call.
     next: usize,
 }
@@ -149,6 +208,7 @@ impl<'a> NativeFlow<'a> {
                 base: 0,
                 guard: None,
                 unsupplied: 0,
+                extent: Extent::Whole,
                 back: None,
             }],
             registers: function.registers,
@@ -195,11 +255,17 @@ impl<'a> NativeFlow<'a> {
             frame: number,
             change: FrameChange::None,
         };
-        if let (Some(callee), Some((window, count))) = (callee, call_of(&instr)) {
+        if let Some(back) = frame.back
+            && frame.extent == Extent::ShortWays
+            && !returns_soon(&frame.source.words, at - frame.first, back.count, SHORT)
+        {
+            (step.next, step.target, step.falls_through) = (back.next, Some(back.next), false);
+            step.change = FrameChange::Call { to: back.to, count: back.count };
+        } else if let (Some(callee), Some((window, count))) = (callee, call_of(&instr)) {
             let (first, base) = (self.steps.len(), window.0 + 2);
-            let back = Some(Back { frame: number, to: window.0, next });
-            let InlinedCall { source, guard, unsupplied } = callee;
-            self.frames.push(FlowFrame { source, first, base, guard, unsupplied, back });
+            let back = Some(Back { frame: number, to: window.0, count: count.0, next });
+            let InlinedCall { source, guard, unsupplied, extent } = callee;
+            self.frames.push(FlowFrame { source, first, base, guard, unsupplied, extent, back });
             self.steps.resize(first + source.words.len(), None);
             self.registers = self.registers.max(usize::from(base) + source.registers);
             step.target = Some(first);
@@ -216,7 +282,7 @@ impl<'a> NativeFlow<'a> {
     }
 
     /// Returns what an instruction of a frame calls, if that is inlined there: a small function that it
-    /// names, or the function itself, once.
+    /// names, or the function itself: all of it once, and its short ways.
     fn callee(&self, frame: usize, instr: &Instr, inlined: &'a [InlinedSource]) -> Option<InlinedCall<'a>> {
         let (window, count) = call_of(instr)?;
         let caller = &self.frames[frame];
@@ -224,8 +290,10 @@ impl<'a> NativeFlow<'a> {
             Instr::CallSelf { .. } => {
                 let source = caller.source;
                 // Where variables are bound, the calls take less of the time.
-                let is_inlined = frame == 0 && is_simple(&source.words, |opcode| opcode != Opcode::Bind);
-                is_inlined.then_some(InlinedCall { source, guard: None, unsupplied: 0 })?
+                let is_whole = frame == 0 && is_simple(&source.words, |opcode| opcode != Opcode::Bind);
+                let extent = if is_whole { Extent::Whole } else { Extent::ShortWays };
+                let is_inlined = is_whole || returns_soon(&source.words, 0, count.0, SHORT);
+                is_inlined.then_some(InlinedCall { source, guard: None, unsupplied: 0, extent })?
             }
             Instr::CallGlobal { symbol, .. } => {
                 let symbol = *caller.source.constants.get(symbol.0 as usize)?;
@@ -235,7 +303,12 @@ impl<'a> NativeFlow<'a> {
                 if self.is_within(frame, &callee.function) {
                     return None;
                 }
-                InlinedCall { source: &callee.function, guard: Some(callee.callee), unsupplied }
+                InlinedCall {
+                    source: &callee.function,
+                    guard: Some(callee.callee),
+                    unsupplied,
+                    extent: Extent::Whole,
+                }
             }
             _ => return None,
         };

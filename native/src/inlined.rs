@@ -112,6 +112,20 @@ impl Translator<'_, '_> {
         self.ended();
     }
 
+    /// Calls the running function, of which the short ways are inlined, in the frame that has been made for
+    /// it, and goes on behind its call.
+    pub(crate) fn call_whole(&mut self, to: u8, step: &FlowStep) {
+        self.put_back();
+        let (frame, itself, pointer) = (self.base_at(self.at), self.itself, self.pointer);
+        let address = self.b.ins().func_addr(pointer, itself);
+        let value = self.invoke(to, frame, address, true, Want::ONE);
+        self.forget(RegisterBits::all_from(to));
+        self.set(to, value, Known::Nothing);
+        let target = self.target(step);
+        self.jump(target);
+        self.ended();
+    }
+
     /// Calls a function in the frame of the running one.
     fn call_in_place(&mut self, window: u8, count: u8, function: Ssa, to: u8) {
         let Replaced { address, one, more } = self.replace_frame(window, count, function);

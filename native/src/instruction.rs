@@ -51,6 +51,7 @@ impl Translator<'_, '_> {
             FrameChange::None => {}
             FrameChange::Enter { window, count } => return self.enter_inlined(window, count, step),
             FrameChange::Return { to } => return self.leave_inlined(to, step),
+            FrameChange::Call { to, .. } => return self.call_whole(to, step),
         }
         match step.instr {
             Instr::Move { dst, src } => {

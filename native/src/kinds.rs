@@ -103,6 +103,7 @@ impl NativeKinds {
                 let value = returned(&step.instr).map_or(Known::Nothing, of);
                 return (value == Known::Nothing && is_guessed(to)).then_some(to);
             }
+            FrameChange::Call { to, .. } => return is_guessed(to).then_some(to),
         }
         let dst = match step.instr {
             Instr::Add { dst, left, right }
@@ -231,6 +232,8 @@ impl NativeKinds {
                 let mut kept_back = self.kept_back[at];
                 if let FrameChange::Enter { window, count } = step.change {
                     kept_back = kept_back.without(dropped(window, count));
+                } else if let FrameChange::Call { .. } = step.change {
+                    kept_back = RegisterBits::NONE;
                 } else if window_of(&step.instr).is_some() && !is_root(&step.instr, &kinds) {
                     kept_back = RegisterBits::NONE;
                 }
@@ -283,6 +286,11 @@ impl NativeKinds {
             FrameChange::None => {}
             FrameChange::Enter { window, count } => return live.without(dropped(window, count)),
             FrameChange::Return { to } => live = live.without(RegisterBits::all_from(to)),
+            FrameChange::Call { to, count } => {
+                live = live.without(RegisterBits::all_from(to));
+                live.insert_range(usize::from(to) + 2, usize::from(count));
+                return live;
+            }
         }
         step.instr.visit_registers(|access| {
             if let RegisterAccess::Write { first, count } = access {
@@ -313,6 +321,13 @@ impl NativeKinds {
                 let value = returned(instr).map_or(Known::Nothing, |register| kinds[usize::from(register)]);
                 forget_all(kinds, RegisterBits::all_from(to));
                 kinds[usize::from(to)] = if guess == Some(to) { Known::Double } else { value };
+                return;
+            }
+            FrameChange::Call { to, .. } => {
+                forget_all(kinds, RegisterBits::all_from(to));
+                if guess == Some(to) {
+                    kinds[usize::from(to)] = Known::Double;
+                }
                 return;
             }
         }

@@ -28,7 +28,9 @@
 //! * **N7, native stack.** A frame of machine code holds nothing that another one needs. There are as many as
 //!   fit between the base at the entry and [`NativeContext::limit`], which the interpreter keeps near.
 //! * **N8, inlined functions.** A call of a global function, or of the running one, may be replaced by the
-//!   instructions of the function. Its frame is made all the same, so that N3 to N5 hold within it. The call
+//!   instructions of the function. Its frame is made all the same, so that N3 to N5 hold within it. Or only
+//!   the ways are inlined on which the running function returns soon: what they do before another way
+//!   branches off can be repeated, and there the function is called in the frame that has been made. The call
 //!   of a global function is given up, with [`REDEFINED`], if the symbol has another function by then. So the
 //!   machine code is good only as long as the functions inlined in it are there.
 //!

@@ -2,7 +2,7 @@
 //! that are inlined, with arguments or values that are put in order, of builtins as functions, too deep ones.
 
 /// Name and text of each.
-pub(super) const CALLS: [(&str, &str); 8] = [
+pub(super) const CALLS: [(&str, &str); 9] = [
     (
         "functions redefined while they run",
         "(defun step-of (x) (+ x 1))
@@ -19,6 +19,40 @@ pub(super) const CALLS: [(&str, &str); 8] = [
            (when (= n 40) (setf (symbol-function 'again) (lambda (n) (list :new n))))
            (if (= n 0) :old (again (- n 1))))
          (print (again 100)) (print (again 3))",
+    ),
+    (
+        "functions that call themselves and often return at once",
+        "(defun tak (x y z)
+           (if (< y x) (tak (tak (- x 1) y z) (tak (- y 1) z x) (tak (- z 1) x y)) z))
+         (defun try (x y z) (handler-case (tak x y z) (error (e) (type-of e))))
+         (print (list (try 8 4 2) (try 8.5 4.25 2.0) (try 17/2 4 2.5) (try nil 4 2) (try 5 4 nil) (try 5 2 'z)))
+         (let ((big (expt 10 30))) (print (list (- (try (+ big 6) (+ big 3) big) big))))
+         (defun halves (n x)
+           (if (< n 1) x (halves (- n 1) (+ (halves (floor n 2) (* x 0.5)) (* x 0.25)))))
+         (print (list (halves 12 1.0) (halves 12 3) (halves 0 nil) (halves 9 1/3) (halves 12 1.0e300)))
+         (defun sum-of (x) (cond ((null x) 0) ((atom x) x) (t (+ (sum-of (car x)) (sum-of (cdr x))))))
+         (defun try-sum (x) (handler-case (sum-of x) (error (e) (type-of e))))
+         (print (list (try-sum '(1 (2.5 3) (4 . 5))) (try-sum '(1 (2 . x))) (try-sum 7) (try-sum nil)))
+         (defun named (n)
+           (when (= n 4) (return-from named :four))
+           (let ((seen nil))
+             (dotimes (i n) (push (named i) seen))
+             (if (eql n 3) 'three seen)))
+         (print (named 7))
+         (defun several (n) (if (= n 0) (values 1 2) (multiple-value-list (several (- n 1)))))
+         (defun first-of (n) (if (= n 0) (values 1.5 2) (+ 0.5 (first-of (- n 1)) (first-of 0))))
+         (print (list (several 3) (multiple-value-list (several 0)) (first-of 9)))
+         (defun changed (n)
+           (when (= n 6) (setf (symbol-function 'changed) (lambda (n) (list :new n))))
+           (if (< n 1) n (list (changed (- n 1)) (changed (- n 5)))))
+         (print (list (changed 5) (changed 9) (changed 3)))
+         (defun down (n) (if (= n 0) 0 (+ 1 (down (- n 1)) (down 0))))
+         (print (handler-case (down 10000000) (condition (c) (type-of c))))
+         (print (down 300))
+         (defun turned (x y) (setq y x x 3) (if (= y 0) x (list x (turned (- y 1) x) y)))
+         (print (list (turned 0 7) (turned 4 7)))
+         (defun found (n x) (if (eq n x) :found (list (found (1+ n) x))))
+         (print (list (found 0 3) (handler-case (found 1.0 nil) (condition (c) (type-of c)))))",
     ),
     (
         "small functions within each other",
