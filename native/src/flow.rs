@@ -144,7 +144,7 @@ pub(crate) struct FlowFrame<'a> {
     /// Number of the optional parameters that get no argument.
     pub(crate) unsupplied: u8,
     /// How much of it is inlined.
-    extent: Extent,
+    part: InlinedPart,
     /// Where an inlined function returns to.
     back: Option<Back>,
 }
@@ -154,12 +154,12 @@ struct InlinedCall<'a> {
     source: &'a FunctionSource,
     guard: Option<Value>,
     unsupplied: u8,
-    extent: Extent,
+    part: InlinedPart,
 }
 
 /// How much of a function is inlined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Extent {
+enum InlinedPart {
     /// All of it.
     Whole,
     /// The ways on which it returns soon; the function is called where another one begins.
@@ -208,7 +208,7 @@ impl<'a> NativeFlow<'a> {
                 base: 0,
                 guard: None,
                 unsupplied: 0,
-                extent: Extent::Whole,
+                part: InlinedPart::Whole,
                 back: None,
             }],
             registers: function.registers,
@@ -256,7 +256,7 @@ impl<'a> NativeFlow<'a> {
             change: FrameChange::None,
         };
         if let Some(back) = frame.back
-            && frame.extent == Extent::ShortWays
+            && frame.part == InlinedPart::ShortWays
             && !returns_soon(&frame.source.words, at - frame.first, back.count, SHORT)
         {
             (step.next, step.target, step.falls_through) = (back.next, Some(back.next), false);
@@ -264,8 +264,8 @@ impl<'a> NativeFlow<'a> {
         } else if let (Some(callee), Some((window, count))) = (callee, call_of(&instr)) {
             let (first, base) = (self.steps.len(), window.0 + 2);
             let back = Some(Back { frame: number, to: window.0, count: count.0, next });
-            let InlinedCall { source, guard, unsupplied, extent } = callee;
-            self.frames.push(FlowFrame { source, first, base, guard, unsupplied, extent, back });
+            let InlinedCall { source, guard, unsupplied, part } = callee;
+            self.frames.push(FlowFrame { source, first, base, guard, unsupplied, part, back });
             self.steps.resize(first + source.words.len(), None);
             self.registers = self.registers.max(usize::from(base) + source.registers);
             step.target = Some(first);
@@ -291,9 +291,9 @@ impl<'a> NativeFlow<'a> {
                 let source = caller.source;
                 // Where variables are bound, the calls take less of the time.
                 let is_whole = frame == 0 && is_simple(&source.words, |opcode| opcode != Opcode::Bind);
-                let extent = if is_whole { Extent::Whole } else { Extent::ShortWays };
+                let part = if is_whole { InlinedPart::Whole } else { InlinedPart::ShortWays };
                 let is_inlined = is_whole || returns_soon(&source.words, 0, count.0, SHORT);
-                is_inlined.then_some(InlinedCall { source, guard: None, unsupplied: 0, extent })?
+                is_inlined.then_some(InlinedCall { source, guard: None, unsupplied: 0, part })?
             }
             Instr::CallGlobal { symbol, .. } => {
                 let symbol = *caller.source.constants.get(symbol.0 as usize)?;
@@ -307,7 +307,7 @@ impl<'a> NativeFlow<'a> {
                     source: &callee.function,
                     guard: Some(callee.callee),
                     unsupplied,
-                    extent: Extent::Whole,
+                    part: InlinedPart::Whole,
                 }
             }
             _ => return None,
