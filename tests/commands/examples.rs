@@ -128,8 +128,8 @@ fn the_spacecraft_is_left_in_order_when_the_memory_stays_used_up() {
         let mut command = eslvm(&options);
         command.arg(seed.to_string()).arg("--library").arg(&library).arg(program);
         let run = process::run(&mut command, "");
-        // Others may be done before, or wait for each other for ever.
-        assert!(matches!(run.status, Some(0 | 4 | 5)), "seed {seed}: {}{}", run.output, run.errors);
+        // Others may be done before, or wait for each other for ever; the flight may fail for want of memory.
+        assert!(matches!(run.status, Some(0 | 1 | 4 | 5)), "seed {seed}: {}{}", run.output, run.errors);
         assert!(run.output.ends_with("pointing at SUN, no rule broken\n"), "seed {seed}: {}", run.output);
     }
 }
