@@ -440,18 +440,27 @@ impl Translator<'_, '_> {
         let x = self.operand(left);
         let (target, next, slow) = (self.target(step), self.block(), self.cold_block());
         let (holds, fails) = if step.instr.opcode().jumps_when() { (target, next) } else { (next, target) };
+        // Where the machine does not do the test, that of a double is worth its place.
+        let others = if self.frame.is_begun_again() { self.cold_block() } else { slow };
         let test = if x.1 == Known::Double {
             let (p, q) = (self.get_double(left), self.b.ins().f64const(f64::from(value)));
             self.b.ins().fcmp(order.of_doubles(), p, q)
         } else {
             if x.1 != Known::Fixnum {
                 let tag = self.b.ins().band_imm_s(x.0, 3);
-                self.refuse(tag, slow);
+                self.refuse(tag, others);
             }
             let word = Value::small(i32::from(value)).bits() as i64;
             self.b.ins().icmp_imm_s(order.of_fixnums(), x.0, word)
         };
         self.branch(test, holds, fails);
+        if others != slow {
+            self.go_to(others);
+            self.require_double(x.0, slow);
+            let (p, q) = (self.decode(x.0), self.b.ins().f64const(f64::from(value)));
+            let test = self.b.ins().fcmp(order.of_doubles(), p, q);
+            self.branch(test, holds, fails);
+        }
         self.go_to(slow);
         self.step_test(target, next);
         self.go_to(next);

@@ -354,8 +354,13 @@ impl Translator<'_, '_> {
         self.refuse(outcome, signal);
     }
 
-    /// Has the machine do a test, then goes to one of two blocks.
+    /// Has the machine do a test, then goes to one of two blocks. What the machine does may be charged, so on
+    /// a short way, which is begun again, the machine code is left in its place.
     pub(crate) fn step_test(&mut self, jump: Block, next: Block) {
+        if self.frame.is_begun_again() {
+            let exit = self.exit();
+            return self.jump(exit);
+        }
         let outcome = self.call_helper(offset_of!(NativeContext, step));
         let signal = self.signal();
         let is_signal = self.equals(outcome, STEP_SIGNAL);

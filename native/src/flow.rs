@@ -52,8 +52,8 @@ fn is_simple(words: &[u32], may_be_there: impl Fn(Opcode) -> bool) -> bool {
 const SHORT: usize = 4;
 
 /// Returns whether a short way leads from the instruction at a word to a return: past tests of registers, and
-/// what writes constants and registers to others than those of the arguments. What is done on it can be
-/// repeated from the beginning of the function.
+/// what writes constants and registers to others than those of the arguments. What is done on it in machine
+/// code can be repeated from the beginning of the function.
 fn returns_soon(words: &[u32], at: usize, arguments: u8, most: usize) -> bool {
     let Some(instr) = Instr::decode(words, at).filter(|_| most > 0) else { return false };
     let dst = match instr {
@@ -147,6 +147,13 @@ pub(crate) struct FlowFrame<'a> {
     part: InlinedPart,
     /// Where an inlined function returns to.
     back: Option<Back>,
+}
+
+impl FlowFrame<'_> {
+    /// Returns whether what is done in it may be done again, in a call of the whole function.
+    pub(crate) fn is_begun_again(&self) -> bool {
+        self.part == InlinedPart::ShortWays
+    }
 }
 
 /// What is inlined at a call.

@@ -30,9 +30,10 @@
 //! * **N8, inlined functions.** A call of a global function, or of the running one, may be replaced by the
 //!   instructions of the function. Its frame is made all the same, so that N3 to N5 hold within it. Or only
 //!   the ways are inlined on which the running function returns soon: what they do before another way
-//!   branches off can be repeated, and there the function is called in the frame that has been made. The call
-//!   of a global function is given up, with [`REDEFINED`], if the symbol has another function by then. So the
-//!   machine code is good only as long as the functions inlined in it are there.
+//!   branches off can be repeated, and calls no function of the machine; there the function is called in the
+//!   frame that has been made. The call of a global function is given up, with [`REDEFINED`], if the symbol
+//!   has another function by then. So the machine code is good only as long as the functions inlined in it
+//!   are there.
 //!
 //! The code is in memory that is either writable or executable, never both. It is given back when the
 //! [`MachineCode`] is dropped: whoever keeps it must not drop it while it runs.
