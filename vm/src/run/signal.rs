@@ -230,21 +230,21 @@ pub(crate) fn deliver_some(vm: &mut Vm) {
         link = next;
     }
     let mut cells = allocate_without_retry(vm, |vm| cells(&mut vm.heap, keepers, arguments));
+    // Nothing is allocated while it is out of the queue. The waits that are closed are in front of its next
+    // link.
+    vm.scheduler.deliveries.signals.pop_front();
     for &wait in &waits {
         hand_over(vm, wait, (event, by), arguments, &mut cells);
     }
     vm.scheduler.spent += waits.len() as u64;
     charge_account(vm, account, Measure::Ticks, waits.len() as u64);
-    let deliveries = &mut vm.scheduler.deliveries;
-    match deliveries.signals.front_mut() {
-        Some(delivery) if link.is_true() => delivery.next = link,
-        _ => {
-            deliveries.signals.pop_front();
-            vm.scheduler.accounts.leave(account);
-            if vm.scheduler.deliveries.is_empty() {
-                release_held(vm);
-            }
-        }
+    if link.is_true() {
+        vm.scheduler.deliveries.signals.push_front(Delivery { next: link, ..delivery });
+        return;
+    }
+    vm.scheduler.accounts.leave(account);
+    if vm.scheduler.deliveries.is_empty() {
+        release_held(vm);
     }
 }
 
