@@ -49,6 +49,7 @@ use crate::value::Value;
 use bucket::Buckets;
 pub(crate) use formula::FormulaError;
 use formula::FormulaParser;
+use query::QueryRoom;
 pub(crate) use query::{Progress, Query, QueryError};
 use relation::Relation;
 use rule::{Rule, Rules};
@@ -95,6 +96,8 @@ pub(crate) struct Database {
     /// Terms of replaced rules, each with the number of the query to be opened next at that time.
     retired: VecDeque<(u64, Vec<Term>)>,
     cells: Vec<Term>,
+    /// Lists of the query that was closed last.
+    room: QueryRoom,
 }
 
 list_state! { Database {
@@ -112,6 +115,7 @@ list_state! { Database {
     released: Derived,
     retired: Derived,
     cells: Derived,
+    room: Derived,
 } }
 
 impl Database {
@@ -132,6 +136,7 @@ impl Database {
             released: self.released.clone(),
             retired: self.retired.clone(),
             cells: Vec::new(),
+            room: QueryRoom::default(),
         })
     }
 
@@ -252,6 +257,7 @@ impl Database {
             released: _,
             retired: _,
             cells: _,
+            room: _,
         } = self;
         let mut rows: Vec<(u64, &Relation, u32)> = Vec::new();
         for relation in relations {

@@ -1,5 +1,6 @@
 //! Open queries: a question is asked, goes on in steps, gives its answers, and is closed.
 
+use super::query::QueryRoom;
 use super::{Database, FormulaError, Progress, Query, QueryError};
 use crate::heap::{AllocError, Heap, Holder};
 use crate::value::Value;
@@ -59,7 +60,7 @@ impl Database {
         let query = self.queries.get_mut(&key)?.as_mut()?;
         let terms = &self.terms;
         let mut take = || -> Result<(Value, usize), AllocError> {
-            let mut answers = Vec::with_capacity(PORTION);
+            let mut answers = Vec::with_capacity((query.tuples.len() - query.taken).min(PORTION));
             let mut bindings = Vec::new();
             while let Some(answer) = query.next_answer(answers.len()) {
                 bindings.clear();
@@ -131,6 +132,7 @@ impl Database {
         let Some(Some(mut query)) = self.queries.remove(&key) else { return };
         self.bytes -= query.bytes();
         self.released.push(std::mem::take(&mut query.held));
+        self.room = QueryRoom::of(*query);
         self.tidy(heap);
     }
 }

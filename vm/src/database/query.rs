@@ -191,6 +191,44 @@ pub(crate) struct Query {
     pub(super) taken: usize,
 }
 
+/// The lists of a query that is closed, empty: the next one takes their memory.
+#[derive(Debug, Default)]
+pub(super) struct QueryRoom {
+    names: Vec<Term>,
+    goals: Vec<Goal>,
+    sinks: Vec<Sink>,
+    bindings: Vec<Term>,
+    trail: Vec<u32>,
+    choices: Vec<Choice>,
+    operations: Vec<MatchOperation>,
+    keys: Vec<u64>,
+    asked: Vec<u32>,
+}
+
+impl QueryRoom {
+    /// Most items of a list for which there is room: no list takes more than a few kilobytes.
+    const MOST: usize = 64;
+
+    /// Takes the lists of a query.
+    pub(super) fn of(query: Query) -> QueryRoom {
+        fn emptied<T>(mut list: Vec<T>) -> Vec<T> {
+            list.clear();
+            if list.capacity() <= QueryRoom::MOST { list } else { Vec::new() }
+        }
+        QueryRoom {
+            names: emptied(query.names),
+            goals: emptied(query.goals),
+            sinks: emptied(query.sinks),
+            bindings: emptied(query.bindings),
+            trail: emptied(query.trail),
+            choices: emptied(query.choices),
+            operations: emptied(query.operations),
+            keys: emptied(query.keys),
+            asked: emptied(query.asked),
+        }
+    }
+}
+
 impl Query {
     /// Begins a query. With `wants_facts` the question must be a single pattern; the answers are the facts
     /// that match it, and rules do not count.
@@ -202,7 +240,9 @@ impl Query {
         wants_facts: bool,
         work: &mut usize,
     ) -> Result<Query, FormulaError> {
+        let room = std::mem::take(&mut database.room);
         let mut parser = FormulaParser::new(&mut database.terms, heap, query);
+        parser.names = room.names;
         let parsed = parser.inherit(inherited).and_then(|()| match wants_facts {
             true => parser.pattern(query).map(Formula::Pattern),
             false => parser.formula(query, 0),
@@ -217,15 +257,20 @@ impl Query {
             }
         };
         let rules = if wants_facts { Arc::default() } else { database.rules.clone() };
-        let mut goals = Vec::with_capacity(4);
+        let QueryRoom { mut goals, mut sinks, mut bindings, mut keys, mut asked, .. } = room;
         goals.push(Goal::Solved);
+        sinks.push(Sink::Query);
+        bindings.resize(names.len(), Term::UNBOUND);
+        keys.resize(ranks, 0);
+        let is_asked = |&variable: &u32| !names[variable as usize].is_unbound();
+        asked.extend((0..names.len() as u32).filter(is_asked));
         let mut planner =
             Planner { database, rules: &rules, goals: &mut goals, is_reordered: false, work: 0 };
-        let start = planner.plan(&formula, &mut vec![false; names.len()], 0);
+        // A pattern is not asked what is bound.
+        let count = if let Formula::Pattern(_) = formula { 0 } else { names.len() };
+        let start = planner.plan(&formula, &mut vec![false; count], 0);
         *work += planner.work;
         let is_reordered = planner.is_reordered;
-        let asked: Vec<u32> =
-            (0..names.len() as u32).filter(|&variable| !names[variable as usize].is_unbound()).collect();
         let strata = rules.strata;
         Ok(Query {
             time: database.time,
@@ -237,16 +282,16 @@ impl Query {
             table_bytes: 0,
             by_call: Default::default(),
             consumers: Vec::new(),
-            sinks: vec![Sink::Query],
+            sinks,
             agenda: (0..strata).map(|_| VecDeque::new()).collect(),
             state: SolverState::Goal(start),
             sink: 0,
             stratum: strata,
-            bindings: vec![Term::UNBOUND; names.len()],
-            trail: Vec::new(),
-            choices: Vec::new(),
-            operations: Vec::new(),
-            keys: vec![0; ranks],
+            bindings,
+            trail: room.trail,
+            choices: room.choices,
+            operations: room.operations,
+            keys,
             held,
             tuples: Tuples::new(asked.len()),
             asked,

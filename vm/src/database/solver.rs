@@ -191,9 +191,10 @@ impl Query {
     }
 
     pub(super) fn undo(&mut self, trail: usize) {
-        for variable in self.trail.drain(trail..) {
+        for &variable in &self.trail[trail..] {
             self.bindings[variable as usize] = Term::UNBOUND;
         }
+        self.trail.truncate(trail);
     }
 
     pub(super) fn set_key(&mut self, rank: usize, key: u64) {
