@@ -285,22 +285,29 @@ pub(super) fn take_or_park(vm: &mut Vm, events: Value, options: WaitOptions) -> 
 
 /// Waits for a signal of `events`, and returns its arguments. If `count` is not `NIL`, any signal after they
 /// were counted will do.
+#[inline]
 fn wait_for_signal(vm: &mut Vm, events: Value, count: Value, what: Value) -> Outcome {
+    match link::signalled(&vm.heap, vm.scheduler.task().wait) {
+        Some(signal) => {
+            vm.scheduler.leave_signalled(&mut vm.heap);
+            let arguments = input::arguments(&vm.heap, signal);
+            give_list(vm, arguments)
+        }
+        None => wait_on(vm, events, count, what),
+    }
+}
+
+/// As [`wait_for_signal`], where the signal has not come to the wait of the task, if there is one.
+#[inline(never)]
+fn wait_on(vm: &mut Vm, events: Value, count: Value, what: Value) -> Outcome {
     let wait = vm.scheduler.task().wait;
     if wait.is_true() {
-        return match link::signalled(&vm.heap, wait) {
-            Some(signal) => {
-                vm.scheduler.leave_signalled(&mut vm.heap);
-                let arguments = input::arguments(&vm.heap, signal);
+        return match take_for(vm, wait)? {
+            Some(arguments) => {
+                vm.scheduler.cancel_wait(&mut vm.heap);
                 give_list(vm, arguments)
             }
-            None => match take_for(vm, wait)? {
-                Some(arguments) => {
-                    vm.scheduler.cancel_wait(&mut vm.heap);
-                    give_list(vm, arguments)
-                }
-                None => vm.scheduler.park_at(wait, None),
-            },
+            None => vm.scheduler.park_at(wait, None),
         };
     }
     vm.scheduler.point()?;

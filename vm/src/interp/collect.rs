@@ -268,12 +268,11 @@ impl Vm {
     }
 
     /// Notes where the running task stands, for a scan or a switch.
+    #[inline]
     pub(crate) fn save_cpu(&mut self) {
-        let offset = self.offset_of(self.cpu.base());
-        let pc = SavedPc::new(self.cpu.pc());
         let task = self.scheduler.task_mut();
-        task.base = offset as u32;
-        task.pc = pc;
+        task.base = task.offset_of(self.cpu.base()) as u32;
+        task.pc = SavedPc::new(self.cpu.pc());
     }
 
     /// Completes a whole cycle: for want of room, or since each safepoint is to collect.
@@ -377,11 +376,16 @@ impl Vm {
 
     /// Scans a part of the stack of a task that is to run, unless the cycle under way has scanned all of it.
     /// Returns whether the task may run now.
+    #[inline]
     pub(crate) fn scan_in_turn(&mut self, task: &mut Task) -> bool {
+        let is_scanned = self.heap.phase() != Phase::Marking || task.scanned == self.heap.cycle_id();
+        is_scanned || self.scan_part(task)
+    }
+
+    /// As [`Vm::scan_in_turn`], for a task that is yet to be scanned.
+    #[cold]
+    fn scan_part(&mut self, task: &mut Task) -> bool {
         let cycle = self.heap.cycle_id();
-        if self.heap.phase() != Phase::Marking || task.scanned == cycle {
-            return true;
-        }
         let pause = self.begin_pause();
         let (capacity, top) = (task.stack.capacity(), top_of_task(task));
         if task.stack.scan == 0 && capacity > LARGE_STACK && top < capacity / 4 {

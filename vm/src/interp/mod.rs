@@ -270,7 +270,7 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     let pc = task.pc.get();
     // SAFETY: F3: the base of the task lies in its stack.
     let base = unsafe { task.stack.start().add(task.base as usize) };
-    let stack_end = vm.stack_end();
+    let stack_end = reserve::stack_end(&vm.config, task);
     // SAFETY: the task stands at `pc` in the frame at `base`, and may use its stack up to `stack_end`.
     vm.cpu = unsafe { Cpu::at(pc, base, stack_end, ticks) };
     vm.arm();

@@ -1,8 +1,9 @@
 //! Room on the running task's stack, and the reserves that are for handling the exhaustion of stack and heap,
 //! and for cleanups.
 
+use crate::config::Config;
 use crate::raise::{Exit, Raised};
-use crate::task::{Bindings, Entry, TaskEnd, UnwindTarget, Unwinding};
+use crate::task::{Bindings, Entry, Task, TaskEnd, UnwindTarget, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -18,29 +19,28 @@ const FEW: usize = 4;
 /// Entries or bindings from which on it grows by a quarter instead of doubling.
 const MANY: usize = 1 << 14;
 
+/// Words that the stack of a task may have now.
+#[inline]
+fn stack_limit(config: &Config, task: &Task) -> usize {
+    config.stack_words() + if task.flags.uses_reserve() { RESERVE } else { 0 }
+}
+
+/// Address up to which the stack of a task may be used: its end, or its limit if that comes first.
+#[inline]
+pub(super) fn stack_end(config: &Config, task: &Task) -> *mut Value {
+    // SAFETY: the offset is at most the capacity of the stack.
+    unsafe { task.stack.start().add(task.stack.capacity().min(stack_limit(config, task))) }
+}
+
 impl Vm {
     /// Offset of an address in the running task's stack.
     pub(crate) fn offset_of(&self, base: *mut Value) -> usize {
-        (base.addr() - self.scheduler.task().stack.start().addr()) / size_of::<Value>()
-    }
-
-    /// Words that the running task's stack may have now.
-    #[inline]
-    fn stack_limit(&self) -> usize {
-        self.config.stack_words() + if self.scheduler.task().flags.uses_reserve() { RESERVE } else { 0 }
-    }
-
-    /// Address up to which the running task's stack may be used: its end, or its limit if that comes first.
-    #[inline]
-    pub(super) fn stack_end(&self) -> *mut Value {
-        let stack = &self.scheduler.task().stack;
-        // SAFETY: the offset is at most the capacity of the stack.
-        unsafe { stack.start().add(stack.capacity().min(self.stack_limit())) }
+        self.scheduler.task().offset_of(base)
     }
 
     /// Notes up to where the running task's stack may be used, after that has changed.
     fn update_stack_end(&mut self) {
-        let stack_end = self.stack_end();
+        let stack_end = stack_end(&self.config, self.scheduler.task());
         // SAFETY: it is that of the running task's stack.
         unsafe { self.cpu.set_stack_end(stack_end) };
     }
@@ -51,7 +51,7 @@ impl Vm {
     /// `:stack-exhausted` at the limit, and [`Exit::Collect`] if there is no memory for it. Handling either
     /// has a reserve; see [`Vm::leave_reserve`].
     pub(super) fn reserve_stack(&mut self, words: usize) -> Result<(), Exit> {
-        if words > self.stack_limit() {
+        if words > stack_limit(&self.config, self.scheduler.task()) {
             if self.scheduler.task().flags.uses_reserve() {
                 self.leave_reserve(self.world.known.stack_exhausted);
                 return Err(Exit::Unwind);

@@ -5,6 +5,7 @@ use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::{Count, Pad, Window};
 
 use super::collect::LARGE_STACK;
+use super::reserve::stack_end;
 use super::{code_of, first_instruction, stubs};
 use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap};
@@ -84,7 +85,7 @@ pub(super) fn begin_again(vm: &mut Vm, function: Value, arguments: Value) {
         task.recount(&mut vm.heap);
     }
     first_frame(&vm.heap, task, starter, function, arguments);
-    let (pc, stack_end) = (task.pc.get(), vm.stack_end());
+    let (pc, stack_end) = (task.pc.get(), stack_end(&vm.config, vm.scheduler.task()));
     let task = vm.scheduler.task();
     // SAFETY: F1: the task stands at the first instruction of its first frame, whose base lies in its stack,
     // which ends at `stack_end`.
@@ -118,7 +119,7 @@ pub(crate) fn drop_frames(vm: &mut Vm) {
         unsafe { task.stack.start().copy_to_nonoverlapping(stack.start(), EXIT_BASE as usize) };
         let large = std::mem::replace(&mut task.stack, stack);
         vm.scheduler.tasks.discard(large);
-        let stack_end = vm.stack_end();
+        let stack_end = stack_end(&vm.config, vm.scheduler.task());
         // SAFETY: F1: it is that of the stack that the running task has now.
         unsafe { vm.cpu.set_stack_end(stack_end) };
     } else {

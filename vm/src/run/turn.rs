@@ -25,7 +25,7 @@ pub(crate) fn give_turn(vm: &mut Vm, index: TaskIndex, end: u64) {
 }
 
 /// Gives a task the slices of its turn that are to come.
-#[inline(always)]
+#[inline(never)]
 fn run_slices(vm: &mut Vm, index: TaskIndex, end: u64) {
     while let Some(leave) = run_slice(vm, index, end)
         && goes_on(vm, index, leave, end)
@@ -76,6 +76,7 @@ fn goes_on(vm: &mut Vm, index: TaskIndex, leave: Leave, end: u64) -> bool {
 }
 
 /// Gives a task a slice. `None` if the portion has ended before the slice, which then stays open.
+#[inline(always)]
 fn run_slice(vm: &mut Vm, index: TaskIndex, end: u64) -> Option<Leave> {
     if !vm.scheduler.deliveries.is_empty() {
         deliver_some(vm);
@@ -157,10 +158,13 @@ fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>, portion: u64)
     turn.had_attention = task.flags.attention();
     turn.shortage = task.flags.take_shortage();
     turn.used_before = 0;
+    let left = scheduler.slice_length(&mut task, &vm.config);
+    let has_pending = task.flags.attention() || account != AccountId::NONE;
+    let is_critical = task.critical > 0;
     make_running(vm, task);
-    let left = vm.scheduler.slice_length(&vm.config);
     interp::load(vm, left.min(portion) as i32);
-    let leave = match begin_running(vm, account) {
+    let begun = if has_pending || is_critical { begin_running(vm, has_pending) } else { Ok(()) };
+    let leave = match begun {
         Ok(()) => interp::run(vm),
         Err(leave) => leave,
     };
@@ -227,13 +231,13 @@ fn end_slice(vm: &mut Vm, slice: OpenSlice, leave: Leave) {
     put_back(vm, leave);
 }
 
-/// Does what has to be done before the first instruction of the slice: delivers what is pending, and ends a
-/// critical section that has taken too long.
+/// Does what has to be done before the first instruction of the slice: delivers what is pending, if anything
+/// is, and ends a critical section that has taken too long.
 ///
 /// # Errors
 /// What takes the task off the processor before it runs.
-fn begin_running(vm: &mut Vm, account: AccountId) -> Result<(), Leave> {
-    if vm.scheduler.task().flags.attention() || account != AccountId::NONE {
+fn begin_running(vm: &mut Vm, has_pending: bool) -> Result<(), Leave> {
+    if has_pending {
         deliver_pending(vm)?;
     }
     let task = vm.scheduler.task();

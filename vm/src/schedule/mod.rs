@@ -335,9 +335,10 @@ impl Scheduler {
         self.open_turn = self.tasks.id_at(self.turn.index).map(|task| OpenTurn { task, slice });
     }
 
-    /// Returns the length of the next slice of the running task: the whole turn, or what is left of it. A
-    /// critical section goes beyond.
-    pub(crate) fn slice_length(&mut self, config: &Config) -> u64 {
+    /// Returns the length of the next slice of the task that is to run: the whole turn, or what is left of
+    /// it. A critical section goes beyond.
+    #[inline]
+    pub(crate) fn slice_length(&mut self, task: &mut Task, config: &Config) -> u64 {
         let mut slice = match self.turn.left {
             None => *self.turn.left.insert(u64::from(self.choices.slice(config.slice))),
             Some(0) => u64::from(config.slice),
@@ -346,17 +347,16 @@ impl Scheduler {
         if let Some(budget) = config.budget {
             slice = slice.min(budget.saturating_sub(self.spent));
         }
-        let account = self.task().account;
-        if account != AccountId::NONE {
-            slice = slice.min(self.accounts.left(account));
+        if task.account != AccountId::NONE {
+            slice = slice.min(self.accounts.left(task.account));
         }
-        if let Some(left) = self.task().cleanup_ticks_left() {
+        if let Some(left) = task.cleanup_ticks_left() {
             slice = slice.min(left);
             if left == 0 {
-                self.task_mut().flags.set_attention(true);
+                task.flags.set_attention(true);
             }
         }
-        if self.task().critical > 0 {
+        if task.critical > 0 {
             slice = slice.min(self.turn.critical_left.max(1) as u64);
         }
         slice.max(1)

@@ -292,6 +292,12 @@ pub enum TaskResult {
 }
 
 impl Task {
+    /// Returns the offset of an address in its stack, in words.
+    #[inline]
+    pub(crate) fn offset_of(&self, base: *mut Value) -> usize {
+        (base.addr() - self.stack.start().addr()) / size_of::<Value>()
+    }
+
     /// Creates a task that has yet to be given a frame.
     pub(crate) fn new(object: Value, words: usize) -> Task {
         Task::with_stack(object, Stack::new(words))
