@@ -14,7 +14,7 @@ use crate::maker::{FunctionSource, InlinedSource, NativeSource};
 pub const MAX_INLINED: usize = 48;
 
 /// Most words of all that are inlined in one function.
-const MAX_INLINED_IN_ALL: usize = 600;
+const MAX_INLINED_IN_ALL: usize = 200;
 
 /// Most calls of inlined functions within each other.
 pub const MAX_DEPTH: usize = 3;

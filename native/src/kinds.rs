@@ -164,6 +164,11 @@ impl NativeKinds {
         self.kept_back[at]
     }
 
+    /// Returns whether doubles are kept back anywhere.
+    pub(crate) fn keeps_back(&self) -> bool {
+        self.kept_back.iter().any(|&registers| registers != RegisterBits::NONE)
+    }
+
     fn follow(&mut self, flow: &NativeFlow<'_>) {
         // What is read before it is written is a parameter.
         let entry = (0..flow.registers)

@@ -20,6 +20,9 @@ use crate::translate::Translator;
 /// Most words of a function that is translated; longer ones are left to the interpreter.
 pub const MAX_WORDS: usize = 4000;
 
+/// Most words of a short function, with those that are inlined in it.
+const MAX_SHORT: usize = 100;
+
 /// The code of a function: see N1.
 #[derive(Clone, Debug)]
 pub struct FunctionSource {
@@ -76,7 +79,10 @@ pub enum NotMade {
 
 /// Makes machine code.
 pub struct MachineCodeMaker {
+    /// Generates code without optimizing it, which for most functions gains less than it takes.
     isa: OwnedTargetIsa,
+    /// Optimizes, which is worth it where doubles are computed, and cheap for short functions.
+    optimizing: OwnedTargetIsa,
     builders: FunctionBuilderContext,
 }
 
@@ -89,20 +95,11 @@ impl MachineCodeMaker {
         if cfg!(not(all(unix, any(target_arch = "x86_64", target_arch = "aarch64")))) {
             return Err(NotMade::Unsupported("this system has another way of calling".into()));
         }
-        let unsupported = |error: &dyn std::fmt::Display| NotMade::Unsupported(error.to_string());
-        let mut flags = settings::builder();
-        let verifies = if cfg!(debug_assertions) { "true" } else { "false" };
-        for (name, value) in [
-            ("opt_level", "speed"),
-            ("use_colocated_libcalls", "false"),
-            ("is_pic", "false"),
-            ("enable_verifier", verifies),
-        ] {
-            flags.set(name, value).map_err(|error| unsupported(&error))?;
-        }
-        let builder = cranelift_native::builder().map_err(|error| unsupported(&error))?;
-        let isa = builder.finish(settings::Flags::new(flags)).map_err(|error| unsupported(&error))?;
-        Ok(MachineCodeMaker { isa, builders: FunctionBuilderContext::new() })
+        Ok(MachineCodeMaker {
+            isa: generator("none")?,
+            optimizing: generator("speed")?,
+            builders: FunctionBuilderContext::new(),
+        })
     }
 
     /// Translates a function, and returns how long that took.
@@ -118,7 +115,9 @@ impl MachineCodeMaker {
         }
         let flow = NativeFlow::of(source).ok_or(NotMade::Unfit)?;
         let unsupported = |error: ModuleError| NotMade::Unsupported(error.to_string());
-        let isa: Arc<dyn TargetIsa> = self.isa.clone();
+        let kinds = NativeKinds::of(&flow, source);
+        let is_optimized = kinds.keeps_back() || flow.steps.len() <= MAX_SHORT;
+        let isa: Arc<dyn TargetIsa> = if is_optimized { self.optimizing.clone() } else { self.isa.clone() };
         let mut module = JITModule::new(JITBuilder::with_isa(isa, default_libcall_names()));
         let mut context = module.make_context();
         context.func.signature = entry_signature(&module);
@@ -128,7 +127,6 @@ impl MachineCodeMaker {
         let itself = module.declare_func_in_func(id, &mut context.func);
         let builder = FunctionBuilder::new(&mut context.func, &mut self.builders);
         let config = module.isa().frontend_config();
-        let kinds = NativeKinds::of(&flow, source);
         Translator::new(builder, source, (&flow, &kinds), itself, module.isa().pointer_type())
             .translate(config);
         let mut defined = module.define_function(id, &mut context);
@@ -155,6 +153,23 @@ impl MachineCodeMaker {
         let said = if cfg!(debug_assertions) { SaidFrame::of(&flow, kinds) } else { Vec::new() };
         Ok(MachineCode { module: Some(module), entry, bytes, loops: flow.loops, said })
     }
+}
+
+/// Returns the code generator for this processor, with an `opt_level` of Cranelift.
+fn generator(opt_level: &str) -> Result<OwnedTargetIsa, NotMade> {
+    let unsupported = |error: &dyn std::fmt::Display| NotMade::Unsupported(error.to_string());
+    let mut flags = settings::builder();
+    let verifies = if cfg!(debug_assertions) { "true" } else { "false" };
+    for (name, value) in [
+        ("opt_level", opt_level),
+        ("use_colocated_libcalls", "false"),
+        ("is_pic", "false"),
+        ("enable_verifier", verifies),
+    ] {
+        flags.set(name, value).map_err(|error| unsupported(&error))?;
+    }
+    let builder = cranelift_native::builder().map_err(|error| unsupported(&error))?;
+    builder.finish(settings::Flags::new(flags)).map_err(|error| unsupported(&error))
 }
 
 /// The signature of [`NativeEntry`].

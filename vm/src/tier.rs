@@ -8,7 +8,10 @@ use std::collections::{HashMap, HashSet};
 #[cfg(feature = "native")]
 use esl_native::abi::EntryStub;
 #[cfg(feature = "native")]
-use esl_native::{MachineCode, MachineCodeHelper, MachineCodeMaker};
+use esl_native::{Known, MachineCode, MachineCodeHelper, MachineCodeMaker};
+
+#[cfg(feature = "native")]
+use crate::value::Value;
 
 /// How the functions of a machine run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,7 +22,7 @@ pub enum Tier {
     /// All as machine code, from their second call on. For tests: to make it takes longer than to run most
     /// functions once.
     Native,
-    /// Those that are found running at the ends of slices again and again as machine code.
+    /// Those as machine code that have taken many ticks, for their size.
     Auto,
 }
 
@@ -61,9 +64,12 @@ pub(crate) struct CompiledFunctions {
     /// The numbers that were given back.
     #[cfg(feature = "native")]
     pub(crate) free: Vec<u32>,
-    /// How often codes were found running.
+    /// What was met of codes.
     #[cfg(feature = "native")]
     pub(crate) heat: Heat,
+    /// Where samples are taken.
+    #[cfg(feature = "native")]
+    pub(crate) sampler: Sampler,
     /// The symbols, by their words, whose functions were inlined and then redefined: these are not inlined
     /// again.
     #[cfg(feature = "native")]
@@ -81,13 +87,53 @@ pub(crate) struct CodeOrder {
     pub(crate) inlined: Box<[u64]>,
 }
 
-/// How often codes were found running, by their addresses. A code that was not met for long may be forgotten
-/// for another one, so this takes little memory, and a count little time.
+/// Where samples are taken, drawn by lot: in one of some slices on average. No program can tell where.
+#[cfg(feature = "native")]
+#[derive(Default)]
+pub(crate) struct Sampler {
+    /// The last number of the sequence.
+    drawn: u32,
+    /// Ticks from the beginning of the next slice to the sample.
+    ahead: u32,
+}
+
+#[cfg(feature = "native")]
+impl Sampler {
+    /// Slices between two samples, on average.
+    pub(crate) const SLICES: u32 = 4;
+
+    /// Returns after how many ticks a sample is to be taken in the slice that begins, if one is: not in its
+    /// first eighth, since a task that has so few ticks between two waits gains nothing by machine code.
+    /// `ticks` are those of the slice, two or more.
+    #[inline]
+    pub(crate) fn place_in(&mut self, ticks: u32) -> Option<u32> {
+        match self.ahead.checked_sub(ticks) {
+            Some(ahead) => {
+                self.ahead = ahead;
+                None
+            }
+            // If the slice ends before, it is taken in a later one.
+            None => Some(self.ahead.max(ticks / 8).max(1)),
+        }
+    }
+
+    /// Draws the place of the next sample. `ticks` are those of a slice.
+    pub(crate) fn move_on(&mut self, ticks: u32) {
+        // The linear congruential generator of "Numerical Recipes", of which the high bits are taken.
+        self.drawn = self.drawn.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let part = u64::from(self.drawn) * u64::from(ticks);
+        let ahead = part >> (u32::BITS - (2 * Sampler::SLICES).ilog2());
+        self.ahead = u32::try_from(ahead).unwrap_or(u32::MAX);
+    }
+}
+
+/// What was met of codes. One that was not met for long may be forgotten for another, so this takes little
+/// memory, and to find a code in it little time.
 #[cfg(feature = "native")]
 #[derive(Default)]
 pub(crate) struct Heat {
-    /// The address and the count of a code, at the place that the address gives.
-    places: Vec<(u64, u32)>,
+    /// At the places that the words of the codes give.
+    codes: Vec<WarmCode>,
 }
 
 #[cfg(feature = "native")]
@@ -95,28 +141,97 @@ impl Heat {
     /// Number of places: a power of two.
     const PLACES: usize = 1024;
 
-    /// Counts a code, and returns its count.
-    pub(crate) fn count(&mut self, code: u64) -> u32 {
-        if self.places.is_empty() {
-            self.places.resize(Heat::PLACES, (0, 0));
+    /// Returns what was met of a code, given by its value's word.
+    pub(crate) fn of(&mut self, code: u64) -> &mut WarmCode {
+        if self.codes.is_empty() {
+            self.codes.resize_with(Heat::PLACES, WarmCode::default);
         }
         let hash = code.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (u64::BITS - Heat::PLACES.ilog2());
-        let place = &mut self.places[hash as usize];
-        if place.0 != code {
-            *place = (code, 0);
+        let warm = &mut self.codes[hash as usize];
+        if warm.code != code {
+            *warm = WarmCode { code, ..WarmCode::default() };
         }
-        place.1 = place.1.saturating_add(1);
-        place.1
+        warm
     }
 
-    /// Forgets the count of a code.
+    /// Forgets a code.
     pub(crate) fn forget(&mut self, code: u64) {
-        self.places.iter_mut().filter(|place| place.0 == code).for_each(|place| *place = (0, 0));
+        self.forget_all(|known| known == code);
     }
 
-    /// Forgets all counts.
-    pub(crate) fn clear(&mut self) {
-        self.places.clear();
+    /// Forgets the codes that `is_forgotten` says.
+    pub(crate) fn forget_all(&mut self, is_forgotten: impl Fn(u64) -> bool) {
+        let known = self.codes.iter_mut().filter(|warm| warm.code != 0);
+        known.filter(|warm| is_forgotten(warm.code)).for_each(|warm| *warm = WarmCode::default());
+    }
+}
+
+/// How many ticks a code has taken, as far as was met, and what its registers held.
+#[cfg(feature = "native")]
+#[derive(Default)]
+pub(crate) struct WarmCode {
+    /// The word of the code; 0 for none.
+    code: u64,
+    ticks: u32,
+    registers: Vec<SeenRegister>,
+}
+
+#[cfg(feature = "native")]
+impl WarmCode {
+    /// Adds ticks; returns whether they reach `hot` by these.
+    pub(crate) fn add(&mut self, ticks: u32, hot: u32) -> bool {
+        let before = self.ticks;
+        self.ticks = before.saturating_add(ticks);
+        before < hot && self.ticks >= hot
+    }
+
+    /// Notes what the first registers hold.
+    pub(crate) fn see(&mut self, registers: &[Value]) {
+        if self.registers.len() < registers.len() {
+            self.registers.resize(registers.len(), SeenRegister::default());
+        }
+        for (seen, &value) in self.registers.iter_mut().zip(registers) {
+            let times = match Known::of(value) {
+                Known::Double => &mut seen.doubles,
+                Known::Fixnum => &mut seen.fixnums,
+                _ if value.is_nil() => &mut seen.nils,
+                _ => &mut seen.others,
+            };
+            *times = times.saturating_add(1);
+        }
+    }
+
+    /// Returns what the registers are guessed to hold, and of one more: some guess, even if it is of nothing,
+    /// lets doubles be told from other values.
+    pub(crate) fn guesses(&self) -> Vec<Known> {
+        self.registers.iter().chain([&SeenRegister::default()]).map(SeenRegister::guess).collect()
+    }
+}
+
+/// How often a register was seen to hold a value of a kind.
+#[cfg(feature = "native")]
+#[derive(Clone, Copy, Default)]
+struct SeenRegister {
+    doubles: u16,
+    fixnums: u16,
+    nils: u16,
+    others: u16,
+}
+
+#[cfg(feature = "native")]
+impl SeenRegister {
+    /// Returns what it held mostly. What has not been written yet holds `nil`, which does not tell against a
+    /// double.
+    fn guess(&self) -> Known {
+        let [doubles, fixnums, nils, others] =
+            [self.doubles, self.fixnums, self.nils, self.others].map(u32::from);
+        if doubles > fixnums + others {
+            Known::Double
+        } else if fixnums > doubles + nils + others {
+            Known::Fixnum
+        } else {
+            Known::Nothing
+        }
     }
 }
 
@@ -145,4 +260,53 @@ pub(crate) struct LoopUse {
     pub(crate) ticks: u32,
     /// Whether the instruction does not lead to machine code for now.
     pub(crate) is_calm: bool,
+}
+
+#[cfg(all(test, feature = "native"))]
+mod tests {
+    use super::*;
+
+    fn guesses(frames: &[[Value; 4]]) -> Vec<Known> {
+        let mut warm = WarmCode::default();
+        frames.iter().for_each(|registers| warm.see(registers));
+        warm.guesses()
+    }
+
+    #[test]
+    fn a_code_is_hot_once() {
+        let mut heat = Heat::default();
+        let reached: Vec<bool> = [40, 50, 30, 500].map(|ticks| heat.of(8).add(ticks, 100)).to_vec();
+        assert_eq!(reached, [false, false, true, false]);
+        assert!(!heat.of(16).add(99, 100));
+        heat.forget_all(|code| code == 8);
+        assert!(heat.of(8).add(100, 100), "it was forgotten");
+        assert!(heat.of(16).add(1, 100), "it was not forgotten");
+    }
+
+    #[test]
+    fn a_register_is_guessed_to_hold_what_it_held_mostly() {
+        let double = Value::double(0.5).unwrap();
+        let (nil, one) = (Value::NIL, Value::small(1));
+        let seen = guesses(&[[nil, one, double, nil], [double, one, one, one], [nil, nil, nil, nil]]);
+        assert_eq!(
+            seen,
+            [Known::Double, Known::Fixnum, Known::Nothing, Known::Nothing, Known::Nothing],
+            "what was not written yet tells against a fixnum, and not against a double"
+        );
+        assert_eq!(guesses(&[]), [Known::Nothing]);
+    }
+
+    #[test]
+    fn samples_are_taken_everywhere_behind_the_first_eighth_in_one_of_four_slices() {
+        let (mut sampler, mut seen) = (Sampler::default(), [0; 16]);
+        for _ in 0..64_000 {
+            let Some(place) = sampler.place_in(16) else { continue };
+            assert_eq!(Some(place), sampler.place_in(16), "it stays until it is taken");
+            seen[place as usize] += 1;
+            sampler.move_on(16);
+        }
+        assert_eq!(seen[..2], [0, 0]);
+        assert!(seen[3..].iter().all(|&count| (700..1000).contains(&count)), "{seen:?}");
+        assert!((12_000..16_000).contains(&seen.iter().sum()), "{seen:?}");
+    }
 }

@@ -229,6 +229,14 @@ pub(super) fn trials() -> Vec<Trial> {
             ),
             Trial::test("tiers bad case: eval in a loop", machine_code_does_not_pile_up),
             Trial::test(
+                "tiers bad case: a hot function that collects all the time",
+                a_collection_forgets_no_hot_function,
+            ),
+            Trial::test(
+                "tiers bad case: a loop whose time is that of a builtin",
+                what_a_builtin_takes_makes_no_function_hot,
+            ),
+            Trial::test(
                 "tiers bad case: an inlined function is collected",
                 machine_code_goes_with_what_is_inlined,
             ),
@@ -272,6 +280,39 @@ fn machine_code_does_not_pile_up() -> Result<(), Failed> {
         return Err(format!("nothing was given back: {report:?}").into());
     }
     Ok(())
+}
+
+/// Returns how many functions became machine code because they were hot.
+fn hot_functions(text: &str) -> Result<usize, Failed> {
+    let config = Config { memory: 8 << 20, ..Config::default() };
+    let mut machine = program::machine(config, Box::new(VirtualHost::new()))?;
+    machine.set_tier(Tier::Auto);
+    program::run_in(&mut machine, &compile(text)?)?;
+    Ok(machine.tier().1.functions)
+}
+
+/// Between two collections the function takes a part of the ticks that make it hot.
+fn a_collection_forgets_no_hot_function() -> Result<(), Failed> {
+    // The thread that makes machine code may not get to it at once.
+    for iterations in [100_000, 400_000, 1_600_000] {
+        let text = format!(
+            "(defun churn (n) (let ((kept nil)) (dotimes (i n) (setq kept (make-array 100))) kept))
+             (churn {iterations})"
+        );
+        if hot_functions(&text)? > 0 {
+            return Ok(());
+        }
+    }
+    Err("no machine code was made".into())
+}
+
+fn what_a_builtin_takes_makes_no_function_hot() -> Result<(), Failed> {
+    let text = "(defvar *all* (make-array 100000))
+         (dotimes (i 2000) (fill *all* i))";
+    match hot_functions(text)? {
+        0 => Ok(()),
+        functions => Err(format!("machine code of {functions} functions").into()),
+    }
 }
 
 /// Machine code in which a function is inlined that is no more would take another one at its address for it.

@@ -102,7 +102,7 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         // Its tick will be taken again.
         vm.cpu.ticks += 1;
     }
-    let place = (SavedPc::new(vm.cpu.pc()), vm.scheduler.task().ticks, vm.cpu.ticks);
+    let place = (SavedPc::new(vm.cpu.pc()), vm.scheduler.task().ticks, vm.cpu.used());
     let turn = &mut vm.scheduler.turn;
     // The turn begins with what there was no room for in the last one.
     let is_retry = turn.used_before + vm.cpu.used() <= 1;

@@ -6,8 +6,9 @@ use esl_native::abi::{CALL_AGAIN, CALL_DONE, CALL_SIGNAL, CALL_VALUES, EntryStub
 
 use super::super::call::{FramePlace, apply_native, call_instead};
 use super::super::{code_of, in_window, stubs, substitute, word_at};
+use super::heat::callee_at;
+use super::make_words;
 use super::step::{attend, leave, parts};
-use super::{callee_at, make_words};
 use crate::heap::layout::CodeObject;
 use crate::raise::Exit;
 use crate::shape::{Shape, Sort};

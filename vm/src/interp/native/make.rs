@@ -72,7 +72,7 @@ pub(super) unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known
         }
         if compiled.asked.len() == MOST_ORDERS {
             // It is asked for when it has been met as often again.
-            return compiled.heat.forget(code.addr() as u64);
+            return compiled.heat.forget(word);
         }
         let source = source_of(compiled, code, guesses);
         let inlined = source.inlined.iter().map(|inlined| inlined.callee.bits()).collect();
@@ -294,7 +294,7 @@ pub(super) unsafe fn uninstall(compiled: &mut CompiledFunctions, code: *mut Code
         }
         compiled.report.bytes -= installed.made.bytes().next_multiple_of(4096);
         compiled.free.push(number);
-        compiled.heat.forget(code.addr() as u64);
+        compiled.heat.forget(Value::from_object(code.cast()).bits());
     }
 }
 

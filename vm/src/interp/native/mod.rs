@@ -9,6 +9,7 @@
 //! the beginning of a function stands at the first instruction.
 
 mod call;
+mod heat;
 mod make;
 mod step;
 mod table;
@@ -16,39 +17,28 @@ mod table;
 use std::ffi::c_void;
 use std::mem::MaybeUninit;
 
-use esl_bytecode::opcode::Opcode;
 use esl_native::abi::{EntryStub, NativeEntry, TAIL};
 use esl_native::{
-    AGAIN, GUESSED_WRONG, IN_PLACE, Known, NativeContext, NativeReply, REDEFINED, RETURN_VALUES, RETURNED,
+    AGAIN, GUESSED_WRONG, IN_PLACE, NativeContext, NativeReply, REDEFINED, RETURN_VALUES, RETURNED,
 };
 
 use super::{Signal, aux_at, code_of, constant, first_instruction, stubs, word_at};
 use crate::fused::quicken_loop;
-use crate::heap::layout::{CodeObject, Kind, SymbolObject};
+use crate::heap::layout::CodeObject;
 use crate::heap::{Heap, Phase};
-use crate::shape::Shape;
 use crate::tier::{CompiledFunctions, LoopUse, Tier};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use heat::note_call;
 pub(super) use make::make_at_entry;
-use make::{install_made, instructions, make, uninstall};
+use make::{instructions, make, uninstall};
 
 /// Words of the stack that one entry may use, which bounds the native stack too: about 500 KB.
 const WORDS_AT_ONCE: usize = 4096;
 
-/// How often a function is found running at the end of a slice, or machine code is left at a call of it,
-/// before machine code is made of it. To make that takes as long as some dozen slices.
-const HOT: u32 = 32;
-
-/// Ticks of so many slices together; longer slices are asked for less often.
-const HOT_TICKS: u32 = 64_000;
-
-/// Fewest slices at whose ends it is found.
-const LEAST_SLICES: u32 = 2;
-
 /// Entries at loop instructions after which their use is looked at.
-const ENTRIES: u32 = 1024;
+const ENTRIES: u32 = 8192;
 
 /// Ticks that each of them has to take on average, lest the interpreter run the loops alone: machine code
 /// that is left at once costs more than it saves.
@@ -56,9 +46,6 @@ const LEAST_TICKS: u32 = 8;
 
 /// Wrong guesses after which machine code is made without any.
 const WRONG_GUESSES: u32 = 64;
-
-/// Frames that are looked at, from the running one on.
-const FRAMES: usize = 4;
 
 /// The entry of code of which machine code is made at its first call.
 pub(crate) static MAKE_AT_ENTRY: u32 = stubs::MAKE_AT_ENTRY as u32;
@@ -316,58 +303,6 @@ unsafe fn make_words(context: &mut NativeContext) {
     }
 }
 
-/// Returns what the instruction at `pc` calls, if it is a call of a global function or of a value.
-///
-/// # Safety
-/// `pc` is the address of an instruction of the frame `base`.
-unsafe fn callee_at(pc: *const u32, base: *mut Value) -> Option<Value> {
-    // SAFETY: V1, V3, V4: the operands of the instruction are there, and a constant is the symbol.
-    unsafe {
-        let word = word_at(pc);
-        match word.opcode()? {
-            Opcode::CallGlobal | Opcode::TailCallGlobal => {
-                let symbol = constant(base, aux_at(pc) as usize).object_ptr().cast::<SymbolObject>();
-                Some((*symbol).function)
-            }
-            Opcode::Call | Opcode::TailCall => Some(*base.add(word.a())),
-            _ => None,
-        }
-    }
-}
-
-/// Counts a call at which machine code was left, and makes machine code of the callee if there were many.
-/// What the arguments are now is the guess of what they will be.
-///
-/// # Safety
-/// `pc` is the address of an instruction of the frame `base`.
-#[cold]
-#[inline(never)]
-unsafe fn note_call(vm: &mut Vm, pc: u64, base: u64) {
-    let pc: *const u32 = std::ptr::with_exposed_provenance(pc as usize);
-    let base: *mut Value = std::ptr::with_exposed_provenance_mut(base as usize);
-    // SAFETY: V1, V3, V4: the operands of the instruction are there; the function of a symbol is a Function.
-    unsafe {
-        let word = word_at(pc);
-        let Some(function) = callee_at(pc, base) else { return };
-        if !function.is_object() || (*function.object_ptr()).kind != Kind::Function {
-            return;
-        }
-        let code = code_of(function);
-        if !Shape::is_bytecode((*code).spare[0]) {
-            return;
-        }
-        if vm.compiled.heat.count(code.addr() as u64) == HOT {
-            // Where others than these are taken too, the registers get them in another order.
-            let count = if (*code).arity == word.b() as u32 { word.b() } else { 0 };
-            let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), count);
-            let mut guesses: Vec<_> = arguments.iter().map(|&value| Known::of(value)).collect();
-            // Some, even if it is of nothing: doubles are told from other values.
-            guesses.push(Known::Nothing);
-            make(vm, code, guesses);
-        }
-    }
-}
-
 /// Counts a wrong guess, and has machine code without guesses made of the function if there were many.
 ///
 /// # Safety
@@ -428,34 +363,12 @@ impl Vm {
         unsafe { self.heap.set_code_entry((tier == Tier::Native).then_some(&MAKE_AT_ENTRY)) };
     }
 
-    /// Notes which functions run at the end of a slice, and makes machine code of those that are hot.
-    pub(super) fn note_heat(&mut self) {
-        if self.compiled.tier == Tier::Interpreter {
-            return;
-        }
-        install_made(&mut self.compiled);
-        let of_slices = (HOT_TICKS / self.config.slice.max(1)).clamp(LEAST_SLICES, HOT);
-        let frames = self.frames().take(FRAMES);
-        let functions: Vec<_> = frames.map(|frame| (frame.function, frame.registers().to_vec())).collect();
-        for (function, registers) in functions {
-            // SAFETY: F2: the function of a frame is a Function.
-            unsafe {
-                let code = code_of(function);
-                let is_stub = (*code).nwords < 2;
-                let heat = self.compiled.heat.count(code.addr() as u64);
-                if (heat == of_slices || heat == HOT) && !is_stub {
-                    make(self, code, registers.into_iter().map(Known::of).collect());
-                }
-            }
-        }
-    }
-
     /// Gives back the machine code of functions that nothing reaches. To be called when all that is reached
     /// is marked, and no machine code runs.
     pub(super) fn give_back_code(compiled: &mut CompiledFunctions, heap: &Heap) {
-        compiled.heat.clear();
         // SAFETY: a word was made of the address of an object; whether that is marked is told by its address.
         let is_there = |word: u64| heap.is_marked(unsafe { Value::from_bits(word) });
+        compiled.heat.forget_all(|word| !is_there(word));
         let are_there = |words: &[u64]| words.iter().all(|&word| is_there(word));
         compiled.asked.retain(|_, order| is_there(order.code) && are_there(&order.inlined));
         compiled.redefined.retain(|&symbol| is_there(symbol));
