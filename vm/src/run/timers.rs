@@ -24,13 +24,16 @@ const AT_ONCE: usize = 1000;
 /// wanted, drops them: while tasks run, none may fire for long.
 #[inline(always)]
 pub(super) fn look_at_clock(vm: &mut Vm) {
+    if vm.scheduler.timers.is_empty() {
+        return;
+    }
     if vm.scheduler.timers.wants_sweep() {
         vm.scheduler.sweep_timers();
     }
-    let Scheduler { timers, clock, spent, .. } = &vm.scheduler;
+    let Scheduler { clock, spent, .. } = &vm.scheduler;
     let wait = if clock.is_virtual { VIRTUAL_TICKS } else { CLOCK_TICKS };
     let since = if clock.is_virtual { clock.moved_at } else { clock.looked_at };
-    if !timers.is_empty() && (clock.more_is_due || spent.saturating_sub(since) >= wait) {
+    if clock.more_is_due || spent.saturating_sub(since) >= wait {
         ask_clock(vm);
     }
 }

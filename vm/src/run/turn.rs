@@ -19,13 +19,14 @@ use crate::vm::Vm;
 /// Gives a runnable task its turn: one slice, or its parts where it is cut, and as many more as it takes to
 /// leave a critical section. `end` is the number of ticks of the run at which the portion is over; the turn
 /// stays open then.
+#[inline(always)]
 pub(crate) fn give_turn(vm: &mut Vm, index: TaskIndex, end: u64) {
     vm.scheduler.turn.left = None;
     run_slices(vm, index, end);
 }
 
 /// Gives a task the slices of its turn that are to come.
-#[inline(never)]
+#[inline(always)]
 fn run_slices(vm: &mut Vm, index: TaskIndex, end: u64) {
     while let Some(leave) = run_slice(vm, index, end)
         && goes_on(vm, index, leave, end)
@@ -123,7 +124,9 @@ fn settle_slice(
     };
     let used = vm.cpu.take_used();
     slice.used += used;
-    slice.bytes += vm.bytes_for_accounts().saturating_sub(allocated);
+    if vm.scheduler.accounts.count_bytes() {
+        slice.bytes += vm.heap.stats().allocated.saturating_sub(allocated);
+    }
     if leave == Leave::Slice && used >= portion && used < slice.left && vm.slice_may_go_on() {
         vm.scheduler.spent += used;
         slice.left -= used;

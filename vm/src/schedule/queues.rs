@@ -78,7 +78,13 @@ impl RunQueues {
         }
         while self.occupied != 0 {
             let priority = self.occupied.ilog2();
-            if let Some(index) = pop(&mut self.queues[priority as usize], tasks, choices) {
+            let queue = &mut self.queues[priority as usize];
+            if choices.is_first()
+                && let Some(index) = pop_first(queue, tasks)
+            {
+                return Some(index);
+            }
+            if let Some(index) = pop(queue, tasks, choices) {
                 return Some(index);
             }
             self.occupied &= !(1 << priority);
@@ -87,14 +93,22 @@ impl RunQueues {
     }
 }
 
+#[inline]
 fn is_valid(queued: Queued, tasks: &Tasks) -> bool {
     tasks
         .at(queued.index)
         .is_some_and(|task| task.serial == queued.serial && task.state == TaskState::Runnable)
 }
 
+/// Takes the first task from a queue, if its place is good, which it mostly is.
+#[inline(always)]
+fn pop_first(queue: &mut VecDeque<Queued>, tasks: &Tasks) -> Option<TaskIndex> {
+    let index = queue.front().copied().filter(|&first| is_valid(first, tasks))?.index;
+    queue.pop_front();
+    Some(index)
+}
+
 /// Takes a task from a queue, and drops places that are no longer good.
-#[inline]
 fn pop(queue: &mut VecDeque<Queued>, tasks: &Tasks, choices: &mut Choices) -> Option<TaskIndex> {
     while let Some(&first) = queue.front() {
         if !is_valid(first, tasks) {
