@@ -77,7 +77,7 @@ pub(crate) struct Exchange {
     /// Charges of builtins, until the interpreter takes them.
     pub(crate) charges: Charges,
     /// Place and time of the last collection for want of room; a second one there would not help.
-    pub(crate) collected_at: Option<(SavedPc, u64, u64)>,
+    pub(crate) collected_at: Option<(SavedPc, u64)>,
     /// The overhead of collections for want of room.
     pub(crate) overhead: CollectionOverhead,
 }

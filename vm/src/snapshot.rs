@@ -61,7 +61,7 @@ struct SavedOutside {
 struct SavedExchange {
     values: Vec<Value>,
     lookups: Lookups,
-    collected_at: Option<(SavedPc, u64, u64)>,
+    collected_at: Option<(SavedPc, u64)>,
     overhead: CollectionOverhead,
 }
 

@@ -102,10 +102,11 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         // Its tick will be taken again.
         vm.cpu.ticks += 1;
     }
-    let place = (SavedPc::new(vm.cpu.pc()), vm.scheduler.task().ticks, vm.cpu.used());
+    let used = vm.scheduler.turn.used_before + vm.cpu.used();
+    let place = (SavedPc::new(vm.cpu.pc()), vm.scheduler.task().ticks + used);
     let turn = &mut vm.scheduler.turn;
     // The turn begins with what there was no room for in the last one.
-    let is_retry = turn.used_before + vm.cpu.used() <= 1;
+    let is_retry = used <= 1;
     let shortage = std::mem::take(&mut turn.shortage);
     let has_collected = vm.exchange.collected_at.take() == Some(place);
     if has_collected || is_retry && shortage == Shortage::Collected {
