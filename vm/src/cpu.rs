@@ -22,8 +22,6 @@ pub(crate) struct Cpu {
     pub(crate) ticks: i32,
     /// Ticks kept back so that the collector has its turn at the next tick.
     pub(crate) reserve: i32,
-    /// Ticks kept back so that a sample is taken before them of what runs; 0 if none is to be taken.
-    pub(crate) behind_sample: i32,
     /// Ticks of this slice that were given out at its beginning.
     pub(crate) granted: i32,
     /// Number of turns of the collector in this slice.
@@ -40,7 +38,6 @@ impl Cpu {
             wants_one: false,
             ticks: 0,
             reserve: 0,
-            behind_sample: 0,
             granted: 0,
             collections: 0,
         }
@@ -57,17 +54,7 @@ impl Cpu {
         stack_end: *mut Value,
         ticks: i32,
     ) -> Cpu {
-        Cpu {
-            pc,
-            base,
-            stack_end,
-            wants_one: false,
-            ticks,
-            reserve: 0,
-            behind_sample: 0,
-            granted: ticks,
-            collections: 0,
-        }
+        Cpu { pc, base, stack_end, wants_one: false, ticks, reserve: 0, granted: ticks, collections: 0 }
     }
 
     /// Returns the address of the next instruction, or of the one that was given up.
@@ -117,7 +104,7 @@ impl Cpu {
 
     /// Returns the ticks that are left in the slice; negative if it is overdrawn.
     pub(crate) fn left(&self) -> i64 {
-        i64::from(self.reserve) + i64::from(self.behind_sample) + i64::from(self.ticks)
+        i64::from(self.reserve) + i64::from(self.ticks)
     }
 
     /// Returns the ticks of the slice that were used.
@@ -129,7 +116,7 @@ impl Cpu {
     #[inline]
     pub(crate) fn take_used(&mut self) -> u64 {
         let used = self.used();
-        (self.reserve, self.behind_sample) = (0, 0);
+        self.reserve = 0;
         used
     }
 }

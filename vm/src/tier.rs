@@ -67,9 +67,6 @@ pub(crate) struct CompiledFunctions {
     /// What was met of codes.
     #[cfg(feature = "native")]
     pub(crate) heat: Heat,
-    /// Where samples are taken.
-    #[cfg(feature = "native")]
-    pub(crate) sampler: Sampler,
     /// The symbols, by their words, whose functions were inlined and then redefined: these are not inlined
     /// again.
     #[cfg(feature = "native")]
@@ -85,46 +82,6 @@ pub(crate) struct CodeOrder {
     pub(crate) has_guesses: bool,
     /// The functions that may be inlined in it, by their words.
     pub(crate) inlined: Box<[u64]>,
-}
-
-/// Where samples are taken, drawn by lot: in one of some slices on average. No program can tell where.
-#[cfg(feature = "native")]
-#[derive(Default)]
-pub(crate) struct Sampler {
-    /// The last number of the sequence.
-    drawn: u32,
-    /// Ticks from the beginning of the next slice to the sample.
-    ahead: u32,
-}
-
-#[cfg(feature = "native")]
-impl Sampler {
-    /// Slices between two samples, on average.
-    pub(crate) const SLICES: u32 = 4;
-
-    /// Returns after how many ticks a sample is to be taken in the slice that begins, if one is: not in its
-    /// first eighth, since a task that has so few ticks between two waits gains nothing by machine code.
-    /// `ticks` are those of the slice, two or more.
-    #[inline]
-    pub(crate) fn place_in(&mut self, ticks: u32) -> Option<u32> {
-        match self.ahead.checked_sub(ticks) {
-            Some(ahead) => {
-                self.ahead = ahead;
-                None
-            }
-            // If the slice ends before, it is taken in a later one.
-            None => Some(self.ahead.max(ticks / 8).max(1)),
-        }
-    }
-
-    /// Draws the place of the next sample. `ticks` are those of a slice.
-    pub(crate) fn move_on(&mut self, ticks: u32) {
-        // The linear congruential generator of "Numerical Recipes", of which the high bits are taken.
-        self.drawn = self.drawn.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let part = u64::from(self.drawn) * u64::from(ticks);
-        let ahead = part >> (u32::BITS - (2 * Sampler::SLICES).ilog2());
-        self.ahead = u32::try_from(ahead).unwrap_or(u32::MAX);
-    }
 }
 
 /// What was met of codes. One that was not met for long may be forgotten for another, so this takes little
@@ -294,19 +251,5 @@ mod tests {
             "what was not written yet tells against a fixnum, and not against a double"
         );
         assert_eq!(guesses(&[]), [Known::Nothing]);
-    }
-
-    #[test]
-    fn samples_are_taken_everywhere_behind_the_first_eighth_in_one_of_four_slices() {
-        let (mut sampler, mut seen) = (Sampler::default(), [0; 16]);
-        for _ in 0..64_000 {
-            let Some(place) = sampler.place_in(16) else { continue };
-            assert_eq!(Some(place), sampler.place_in(16), "it stays until it is taken");
-            seen[place as usize] += 1;
-            sampler.move_on(16);
-        }
-        assert_eq!(seen[..2], [0, 0]);
-        assert!(seen[3..].iter().all(|&count| (700..1000).contains(&count)), "{seen:?}");
-        assert!((12_000..16_000).contains(&seen.iter().sum()), "{seen:?}");
     }
 }

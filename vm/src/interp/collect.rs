@@ -189,12 +189,8 @@ impl Vm {
     pub(super) fn safepoint(&mut self) -> Option<Leave> {
         // `ticks` is negative here: at least by the tick that was not there, and more if builtins have
         // overdrawn.
-        let left = self.cpu.reserve + self.cpu.behind_sample + self.cpu.ticks + 1;
-        #[cfg(feature = "native")]
-        if self.cpu.behind_sample > 0 {
-            self.take_sample();
-        }
-        (self.cpu.reserve, self.cpu.behind_sample) = (0, 0);
+        let left = self.cpu.reserve + self.cpu.ticks + 1;
+        self.cpu.reserve = 0;
         if self.config.collect_always {
             self.collect_fully();
         } else if self.heap.gc_due() {
@@ -215,6 +211,8 @@ impl Vm {
             return None;
         }
         self.cpu.ticks = left;
+        #[cfg(feature = "native")]
+        self.note_heat(left < 0);
         Some(Leave::Slice)
     }
 
@@ -256,9 +254,9 @@ impl Vm {
         // A task that owes more than this has had its slice many times over.
         let mut ticks = ticks.saturating_sub(charges.ticks().min(1 << 29) as i32);
         if charges.ends_slice() {
-            let left = ticks + self.cpu.reserve + self.cpu.behind_sample;
+            let left = ticks + self.cpu.reserve;
             self.cpu.granted -= left.max(0);
-            (self.cpu.reserve, self.cpu.behind_sample) = (0, 0);
+            self.cpu.reserve = 0;
             ticks = left.min(0);
             self.scheduler.turn.end_with(TurnEnd::Cut);
         }

@@ -274,8 +274,6 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     // SAFETY: the task stands at `pc` in the frame at `base`, and may use its stack up to `stack_end`.
     vm.cpu = unsafe { Cpu::at(pc, base, stack_end, ticks) };
     vm.arm();
-    #[cfg(feature = "native")]
-    vm.arm_sample();
 }
 
 /// Calls `function` where the task in `vm.scheduler.running`, which is loaded, stands.

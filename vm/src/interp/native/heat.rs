@@ -1,4 +1,4 @@
-//! Which functions are hot: samples of what runs, and calls at which machine code was left.
+//! Which functions are hot: what runs at the ends of slices, and calls at which machine code was left.
 
 use esl_bytecode::opcode::Opcode;
 use smallvec::SmallVec;
@@ -7,7 +7,7 @@ use super::super::{aux_at, code_of, constant, word_at};
 use super::make::{install_made, instructions, make};
 use crate::heap::layout::{CodeObject, Kind, SymbolObject};
 use crate::shape::Shape;
-use crate::tier::{Sampler, Tier};
+use crate::tier::Tier;
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -91,32 +91,18 @@ pub(super) unsafe fn note_call(vm: &mut Vm, pc: u64, base: u64) {
 }
 
 impl Vm {
-    /// Arranges for a sample to be taken in the slice that begins, if it is its turn and machine code is
-    /// made. At its end the same place of a loop could be met again and again.
-    #[inline]
-    pub(in crate::interp) fn arm_sample(&mut self) {
-        let ticks = self.cpu.ticks;
-        if self.compiled.tier != Tier::Interpreter
-            && ticks > 1
-            && self.cpu.reserve == 0
-            && let Some(place) = self.compiled.sampler.place_in(ticks as u32)
-        {
-            self.cpu.ticks = place as i32;
-            self.cpu.behind_sample = ticks - place as i32;
-        }
-    }
-
-    /// Installs what was made, notes which functions run, and makes machine code of those that are hot.
-    #[cold]
-    #[inline(never)]
-    pub(in crate::interp) fn take_sample(&mut self) {
-        install_made(&mut self.compiled);
-        self.compiled.sampler.move_on(self.config.slice);
-        if self.cpu.ticks + 1 < 0 {
-            // A builtin took the ticks here, which machine code makes no faster.
+    /// Notes which functions run at the end of a slice, and makes machine code of those that are hot;
+    /// installs what was made. `is_overdrawn` says that a builtin took the last ticks, which machine code
+    /// makes no faster.
+    pub(in crate::interp) fn note_heat(&mut self, is_overdrawn: bool) {
+        if self.compiled.tier == Tier::Interpreter {
             return;
         }
-        let ticks = (self.cpu.granted as u32).saturating_mul(Sampler::SLICES).min(MOST_TICKS_AT_ONCE);
+        install_made(&mut self.compiled);
+        if is_overdrawn {
+            return;
+        }
+        let ticks = (self.cpu.granted as u32).min(MOST_TICKS_AT_ONCE);
         let mut hot = SmallVec::<[*mut CodeObject; FRAMES]>::new();
         let mut heat = std::mem::take(&mut self.compiled.heat);
         for (depth, frame) in self.frames().take(FRAMES).enumerate() {
