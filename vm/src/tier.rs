@@ -22,7 +22,7 @@ pub enum Tier {
     /// All as machine code, from their second call on. For tests: to make it takes longer than to run most
     /// functions once.
     Native,
-    /// Those as machine code that have taken many ticks, for their size.
+    /// Hot functions as machine code: they have taken many ticks for their size.
     Auto,
 }
 
