@@ -140,27 +140,17 @@ impl Heap {
         if !kind.is_record() || is_vouched_for(kind) {
             return None;
         }
-        if self.marking {
-            self.log_slots(v, N);
-        }
         let object = self.object_of(v, kind)?;
         // SAFETY: H3: a record has `len` values after its header; H5: the first `N` of them are borrowed with
         // the heap, mutably, so nobody else sees them.
-        unsafe {
+        let slots = unsafe {
             if N > (*object).len as usize {
                 return None;
             }
-            Some(&mut *object.add(1).cast::<[Value; N]>())
-        }
-    }
-
-    /// Logs the first `count` slots of a record, all of which may be overwritten, while marking is under way.
-    #[cold]
-    #[inline(never)]
-    fn log_slots(&mut self, v: Value, count: usize) {
-        for index in 0..count {
-            self.mark(self.slot_or_nil(v, index));
-        }
+            &mut *object.add(1).cast::<[Value; N]>()
+        };
+        self.log_all_if_marking(slots);
+        Some(slots)
     }
 
     /// Sets slot `index` of a record of any kind; see [`Heap::record_set`].

@@ -37,6 +37,8 @@ use crate::value::Value;
 const PIECE_LENGTH: usize = if cfg!(miri) { 64 } else { 1024 };
 /// Number of elements that count as one visit.
 const ELEMENTS_PER_VISIT: i64 = 4;
+/// Entries that the mark stack has room for at first.
+const FIRST_ROOM: usize = 64;
 /// Number of visits that the search for gray bytes in one arena counts as.
 const GRAY_SEARCH_VISITS: i64 = 256;
 
@@ -206,9 +208,23 @@ impl Heap {
     }
 
     /// Notes a marked object that has to be followed.
-    #[inline]
+    #[inline(always)]
     fn push(&mut self, v: Value) {
+        if self.marker.stack.len() < self.marker.stack.capacity() {
+            self.marker.stack.push(v);
+        } else {
+            self.push_or_make_gray(v);
+        }
+    }
+
+    /// As [`Heap::push`], where the stack has to grow for it, or is full. Apart, since most marking calls
+    /// nothing then, and so saves no registers.
+    #[cold]
+    #[inline(never)]
+    fn push_or_make_gray(&mut self, v: Value) {
         if self.marker.stack.len() < self.marker.capacity {
+            let length = self.marker.stack.len();
+            self.marker.stack.reserve_exact(length.max(FIRST_ROOM).min(self.marker.capacity - length));
             self.marker.stack.push(v);
         } else {
             self.make_gray(v);

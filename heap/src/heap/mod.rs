@@ -323,6 +323,22 @@ impl Heap {
         self.mark(old);
     }
 
+    /// Logs values as [`Heap::log_if_marking`] does each of them.
+    #[inline(always)]
+    pub fn log_all_if_marking(&mut self, old: &[Value]) {
+        if self.marking {
+            self.log_all(old);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn log_all(&mut self, old: &[Value]) {
+        for &old in old.iter().filter(|old| old.is_address()) {
+            self.mark(old);
+        }
+    }
+
     /// Returns whether the collector wants to run at the next tick: to begin a cycle if idle, else to run a
     /// slice. The answer changes only on the slow path of allocation and by the collector's own functions.
     #[inline(always)]
