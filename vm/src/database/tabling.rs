@@ -171,8 +171,8 @@ impl Query {
         // An answer has a value for each of the variables.
         for (position, &variable) in variables.iter().enumerate() {
             bindings[variable as usize] = answer[position];
+            bound.push(variable);
         }
-        bound.extend_from_slice(variables);
         let (rank, key, next) = (*rank, *at as u64, *next);
         *at += 1;
         self.set_key(rank, key);
@@ -323,7 +323,7 @@ impl Query {
                         return Ok(());
                     }
                 }
-                tuples.insert(values.into_iter())
+                tuples.insert(values.iter().copied())
             }
         };
         if is_new {
