@@ -143,17 +143,16 @@ fn tell_how_far(vm: &mut Vm) {
 /// while all of them wait.
 fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> RunOutcome {
     let end = vm.scheduler.spent.saturating_add(ticks);
+    let limit = vm.config.budget.map_or(end, |budget| budget.min(end));
     loop {
         if let Some(id) = id
             && vm.scheduler.tasks.get(id).is_none_or(|task| task.state == TaskState::Ended)
         {
             return RunOutcome::Done;
         }
-        if vm.scheduler.is_budget_spent(&vm.config) {
-            return RunOutcome::BudgetSpent;
-        }
-        if vm.scheduler.spent >= end {
-            return RunOutcome::TicksUsed;
+        if vm.scheduler.spent >= limit {
+            let is_budget = vm.scheduler.is_budget_spent(&vm.config);
+            return if is_budget { RunOutcome::BudgetSpent } else { RunOutcome::TicksUsed };
         }
         if let Some(turn) = vm.scheduler.open_turn.take() {
             go_on_with_turn(vm, turn, end);

@@ -148,7 +148,9 @@ impl Vm {
     }
 }
 
-/// Makes a task the running one, and runs it for a slice, or for a portion of it.
+/// Makes a task the running one, and runs it for a slice, or for a portion of it. The cycle of the collector
+/// under way has scanned its stack.
+#[inline(always)]
 fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>, portion: u64) -> (OpenSlice, Leave) {
     task.turns = task.turns.wrapping_add(1);
     let account = task.account;
@@ -177,6 +179,7 @@ fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>, portion: u64)
 /// Makes a task the running one, and runs it for a further portion of its slice.
 fn go_on_with_slice(vm: &mut Vm, task: Box<Task>, slice: OpenSlice, portion: u64) -> Leave {
     make_running(vm, task);
+    vm.scan_before_running();
     vm.scheduler.turn.used_before = slice.used;
     interp::load(vm, slice.left.min(portion) as i32);
     vm.cpu.collections = slice.collections;
@@ -192,7 +195,6 @@ fn make_running(vm: &mut Vm, task: Box<Task>) {
     if vm.watch.are_turns_noted {
         note_turn(vm, number);
     }
-    vm.scan_before_running();
 }
 
 /// Takes the running task, in whose slice the portion has ended, off the processor.

@@ -337,7 +337,7 @@ impl Scheduler {
 
     /// Returns the length of the next slice of the task that is to run: the whole turn, or what is left of
     /// it. A critical section goes beyond.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn slice_length(&mut self, task: &mut Task, config: &Config) -> u64 {
         let mut slice = match self.turn.left {
             None => *self.turn.left.insert(u64::from(self.choices.slice(config.slice))),
