@@ -26,65 +26,75 @@ const EXIT_WORDS: usize = 5;
 /// Offset in a task's stack of the base of its first frame.
 pub(super) const FIRST_BASE: u32 = 4;
 
-/// Words of the stack of a task that begins with `function` and the list of `arguments`.
-pub(crate) fn first_words(heap: &Heap, function: Value, arguments: Value) -> usize {
-    4 + direct_code(heap, function, arguments).map_or(3, |code| code.nregs as usize)
+/// What a task begins with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FirstCall {
+    function: Value,
+    arguments: Value,
+    /// The code of the function; `NIL` if it has none.
+    code: Value,
+    /// Number of registers, if the function can be entered just as it is, without arguments.
+    direct: Option<u32>,
 }
 
-/// Returns the code of `function`, if it can be entered without arguments just as it is.
-fn direct_code(heap: &Heap, function: Value, arguments: Value) -> Option<&CodeObject> {
-    let code = heap.code(heap.function_code(function)?)?;
-    (arguments.is_nil() && code.arity == 0 && Shape::unpack(code.spare[0]).sort == Sort::Bytecode)
-        .then_some(code)
-}
+impl FirstCall {
+    /// Creates the call of `function` with a list of arguments.
+    #[inline]
+    pub(crate) fn new(heap: &Heap, function: Value, arguments: Value) -> FirstCall {
+        let code = heap.function_code(function).unwrap_or(Value::NIL);
+        let is_direct = |code: &CodeObject| {
+            arguments.is_nil() && code.arity == 0 && Shape::unpack(code.spare[0]).sort == Sort::Bytecode
+        };
+        let direct = heap.code(code).filter(|code| is_direct(code)).map(|code| code.nregs);
+        FirstCall { function, arguments, code, direct }
+    }
 
-/// Makes the first frame of a new task: that of `function`, or that of a starter, which calls the function
-/// with the list of arguments.
-pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function: Value, arguments: Value) {
-    let stub = stubs::task_exit();
-    if direct_code(heap, function, arguments).is_some() {
-        // SAFETY: the task was made with `first_words`: room for two links and the registers of this code.
-        // The stub's address has the low bits of a fixnum.
+    /// Returns the words of stack that a task needs to begin with it.
+    #[inline]
+    pub(crate) fn words(self) -> usize {
+        4 + self.direct.map_or(3, |registers| registers as usize)
+    }
+
+    /// Makes the first frame of a new task: that of the function, or that of a starter, which calls the
+    /// function with the list of arguments.
+    #[inline]
+    pub(crate) fn make_frame(self, task: &mut Task, starter: Value) {
+        let first = if self.direct.is_some() { self.function } else { starter };
+        let stub = stubs::task_exit();
+        // SAFETY: the task has as many words as `words` says: room for two links and the registers of the
+        // function, or the three of the starter, a Function of bytecode. The stub's address has the low bits
+        // of a fixnum.
         unsafe {
             let start = task.stack.start();
+            // A link for the frame that the stub at the end of the task runs in. Its second word is the code
+            // with which the task began: reports show its place in the source when a tail call has replaced
+            // its frame. The function itself would keep its captures alive.
             *start = starter;
-            *start.add(1) = first_code(heap, function);
-            *start.add(2) = function;
+            *start.add(1) = self.code;
+            *start.add(2) = first;
             *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
+            if self.direct.is_none() {
+                *start.add(4) = self.function;
+                *start.add(6) = self.arguments;
+            }
+            task.pc = SavedPc::new(first_instruction(code_of(first)));
         }
-        // SAFETY: `direct_code` has found the Code of this Function.
-        let first = unsafe { first_instruction(code_of(function)) };
-        task.pc = SavedPc::new(first);
         task.base = FIRST_BASE;
-        return;
     }
-    // SAFETY: the task was made with `first_words`: room for two links and the three registers of the
-    // starter, a Function of bytecode. The stub's address has the low bits of a fixnum.
-    unsafe {
-        let start = task.stack.start();
-        // A link for the frame that the stub at the end of the task runs in.
-        *start = starter;
-        *start.add(1) = first_code(heap, function);
-        *start.add(2) = starter;
-        *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
-        *start.add(4) = function;
-        *start.add(6) = arguments;
-        task.pc = SavedPc::new(first_instruction(code_of(starter)));
-    }
-    task.base = FIRST_BASE;
 }
 
 /// Restarts the running task, which has left all its frames, with a call of `function` with a list of
 /// arguments.
 pub(super) fn begin_again(vm: &mut Vm, function: Value, arguments: Value) {
-    let words = first_words(&vm.heap, function, arguments);
+    let call = FirstCall::new(&vm.heap, function, arguments);
+    let words = call.words();
     let starter = vm.scheduler.starter;
     let task = vm.scheduler.task_mut();
     if task.stack.capacity() < words {
         task.stack.grow(words);
         task.recount(&mut vm.heap);
     }
-    first_frame(&vm.heap, task, starter, function, arguments);
+    call.make_frame(task, starter);
     let (pc, stack_end) = (task.pc.get(), stack_end(&vm.config, vm.scheduler.task()));
     let task = vm.scheduler.task();
     // SAFETY: F1: the task stands at the first instruction of its first frame, whose base lies in its stack,
@@ -94,12 +104,6 @@ pub(super) fn begin_again(vm: &mut Vm, function: Value, arguments: Value) {
         vm.cpu.set_base(task.stack.start().add(task.base as usize));
         vm.cpu.set_stack_end(stack_end);
     }
-}
-
-/// Returns the second word of a task's stack: the code with which the task began. Reports show its place in
-/// the source when a tail call has replaced its frame. The function itself would keep its captures alive.
-fn first_code(heap: &Heap, function: Value) -> Value {
-    heap.function_code(function).unwrap_or(Value::NIL)
 }
 
 /// Returns the code with which a task began.

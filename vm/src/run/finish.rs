@@ -3,7 +3,7 @@
 use super::abort::abort_others;
 use super::pending::interrupt_by;
 use super::question::answer_call;
-use super::signal::keep;
+use super::signal::{keep, wake_waiters};
 use crate::heap::Kind;
 use crate::interp;
 use crate::raise::Exit;
@@ -32,13 +32,15 @@ pub(super) fn finish_task(vm: &mut Vm) {
     let has_one_value = end == TaskEnd::Succeeded && values.len() == 1;
     vm.heap.set_aux(object, Kind::Task, u16::from(has_one_value));
     lineage::end(&mut vm.heap, object);
-    vm.heap.slot_set(object, event::RESULT, result);
     let status = match end {
         TaskEnd::Succeeded => vm.world.known.succeeded,
         TaskEnd::Failed(_) | TaskEnd::Spent => vm.world.known.failed,
         TaskEnd::Aborted => vm.world.known.aborted,
     };
-    vm.heap.slot_set(object, event::STATE, status);
+    if let Some(slots) = vm.heap.slots_mut::<{ event::TASK_LENGTH }>(object, Kind::Task) {
+        slots[event::RESULT] = result;
+        slots[event::STATE] = status;
+    }
     let is_awaited = event::is_awaited(&vm.heap, object);
     let task = vm.scheduler.task_mut();
     let notify = std::mem::replace(&mut task.notify, Value::NIL);
@@ -65,9 +67,11 @@ pub(super) fn finish_task(vm: &mut Vm) {
     values.clear();
     vm.exchange.values = values;
     // The list of arguments is made only if somebody will see it.
-    let is_awaited = event::is_awaited(&vm.heap, object);
-    let arguments: &[Value] = if is_awaited { &[vm.world.known.task_end] } else { &[] };
-    allocate_without_retry(vm, |vm| vm.signal_event(object, arguments).map(|()| Value::NIL));
+    allocate_without_retry(vm, |vm| {
+        let end = vm.world.known.task_end;
+        let arguments = if is_awaited { vm.heap.cons(end, Value::NIL)? } else { Value::NIL };
+        wake_waiters(vm, object, arguments).map(|()| Value::NIL)
+    });
     if let Some(cell) = vm.heap.as_cons(notify) {
         vm.heap.set_car(notify, object);
         keep(vm, cell.car, notify, object);

@@ -109,7 +109,7 @@ pub(super) fn charge_account(vm: &mut Vm, id: AccountId, measure: Measure, units
 /// # Errors
 /// [`Exit::Again`] if that is more than a quota allows: before the task does it again, the form with the
 /// quota ends. Where it cannot, as in a cleanup, the unit may be taken then.
-#[inline]
+#[inline(always)]
 pub(crate) fn admit(vm: &mut Vm, measure: Measure) -> Result<(), Exit> {
     match vm.scheduler.running_account() {
         AccountId::NONE => Ok(()),
@@ -117,6 +117,7 @@ pub(crate) fn admit(vm: &mut Vm, measure: Measure) -> Result<(), Exit> {
     }
 }
 
+#[cold]
 fn admit_to(vm: &mut Vm, account: AccountId, measure: Measure) -> Result<(), Exit> {
     let Err(expired) = vm.scheduler.accounts.admit(account, measure) else { return Ok(()) };
     for (index, number) in expired {

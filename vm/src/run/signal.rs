@@ -111,7 +111,7 @@ fn is_ready(vm: &Vm, wait: Value) -> bool {
 ///
 /// # Errors
 /// [`Exit::Collect`] without room; then nothing has happened.
-fn wake_waiters(vm: &mut Vm, event: Value, arguments: Value) -> Result<(), Exit> {
+pub(super) fn wake_waiters(vm: &mut Vm, event: Value, arguments: Value) -> Result<(), Exit> {
     let any_event = vm.scheduler.any_event;
     let is_awaited = event::is_awaited(&vm.heap, event);
     let any_is_awaited = event::is_awaited(&vm.heap, any_event);

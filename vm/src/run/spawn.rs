@@ -5,7 +5,7 @@
 
 use super::limit::admit;
 use crate::heap::Kind;
-use crate::interp;
+use crate::interp::start::FirstCall;
 use crate::raise::{Exit, Raised};
 use crate::report::{self, Happening};
 use crate::schedule::{AccountOwner, Amount, Measure};
@@ -133,7 +133,8 @@ pub(crate) fn make_task(
         admit(vm, Measure::Tasks)?;
     }
     let Vm { heap, world, scheduler, exchange, .. } = vm;
-    let words = interp::start::first_words(heap, function, arguments);
+    let call = FirstCall::new(heap, function, arguments);
+    let words = call.words();
     let maker = scheduler.running.as_ref();
     let bindings = maker.and_then(|maker| maker.control.get()).map_or(0, |control| control.bindings.len());
     heap.check_room(Task::bytes_with(words) + bindings * Bindings::BYTES)?;
@@ -149,13 +150,10 @@ pub(crate) fn make_task(
     let notify = if is_wait { heap.cons(options.notify, Value::NIL)? } else { options.notify };
     let object = heap.alloc_record(Kind::Task, 0, 0, &slots)?;
     let mut task = scheduler.tasks.make(heap, object, words);
-    interp::start::first_frame(heap, &mut task, scheduler.starter, function, arguments);
+    call.make_frame(&mut task, scheduler.starter);
     // A new task holds nothing that was not found in a cycle under way: what it is made of is in hands of a
     // task that has been scanned, or of the host.
-    heap.log_if_marking(function);
-    heap.log_if_marking(arguments);
-    heap.log_if_marking(notify);
-    heap.log_if_marking(options.notify);
+    heap.log_all_if_marking(&[function, arguments, notify, options.notify]);
     task.scanned = heap.cycle_id();
     scheduler.counts.made += 1;
     task.number = TaskNumber(scheduler.counts.made);
