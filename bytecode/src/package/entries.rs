@@ -30,8 +30,16 @@ impl NameEntries {
         self.fresh.get(name).or_else(|| self.shared.get(name))
     }
 
+    /// Returns the table of all entries, if no copy shares any.
+    fn unshared(&mut self) -> Option<&mut EntryTable> {
+        if self.fresh.is_empty() { Arc::get_mut(&mut self.shared) } else { None }
+    }
+
     /// Returns the entry of a name, to be changed.
     pub(super) fn get_mut(&mut self, name: &str) -> Option<&mut NameEntry> {
+        if self.unshared().is_some() {
+            return self.unshared()?.get_mut(name);
+        }
         if !self.fresh.contains_key(name) {
             let (name, entry) = self.shared.get_key_value(name)?;
             let (name, entry) = (name.clone(), entry.clone());
@@ -48,6 +56,9 @@ impl NameEntries {
 
     /// Enters a name, in place of an entry that it has. Returns the old entry.
     pub(super) fn insert(&mut self, name: Cow<'static, str>, entry: NameEntry) -> Option<NameEntry> {
+        if let Some(entries) = self.unshared() {
+            return entries.insert(name, entry);
+        }
         self.share_many();
         let shared = self.shared.get(&name).cloned();
         self.fresh.insert(name, entry).or(shared)
