@@ -61,6 +61,17 @@ impl Buckets {
         None
     }
 
+    /// Loads the entry that adding one will move to a new bucket. It is mostly not in the cache: before a
+    /// search, whose entries are not either, so that it is waited for at the same time.
+    #[inline(always)]
+    pub(super) fn look_ahead(&self) {
+        let new = self.heads.len();
+        if new > 0 && self.count >= new {
+            let at = self.heads[new - (1 << new.ilog2())];
+            std::hint::black_box(self.links.get(at as usize).map(|link| link.next));
+        }
+    }
+
     /// Adds an entry that is in no bucket yet.
     pub(super) fn add(&mut self, entry: u32, hash: u32) {
         if self.count >= self.heads.len() {

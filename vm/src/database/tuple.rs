@@ -47,6 +47,7 @@ impl Tuples {
             let other = at as usize * *width;
             (0..*width).all(|cell| cells[other + cell] == cells[start + cell])
         };
+        set.look_ahead();
         if set.find(hash, is_it).is_some() {
             self.cells.truncate(start);
             return false;
