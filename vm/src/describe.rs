@@ -26,10 +26,28 @@ pub(crate) fn describe(heap: &Heap, value: Value) -> String {
 
 /// Returns the name of a function.
 pub(crate) fn function_name(heap: &Heap, function: Value) -> String {
+    let mut text = String::new();
+    describe_function_name(heap, function, DEPTH + 1, &mut text);
+    text
+}
+
+fn describe_function_name(heap: &Heap, function: Value, depth: usize, text: &mut String) {
     let code = heap.function_code(function).and_then(|code| heap.code(code));
     match code {
-        Some(CodeObject { name, .. }) if name.is_true() => describe(heap, *name),
-        _ => "an anonymous function".into(),
+        Some(CodeObject { name, .. }) if name.is_true() => describe_name(heap, *name, depth, text),
+        _ => text.push_str("an anonymous function"),
+    }
+}
+
+/// Describes the name of a function or of a class. In a file, any constant may name a function, even the
+/// function itself: a name other than a symbol is a level deeper.
+fn describe_name(heap: &Heap, name: Value, depth: usize, text: &mut String) {
+    if heap.is(name, Kind::Symbol) {
+        describe_symbol(heap, name, text);
+    } else if depth == 0 {
+        text.push('#');
+    } else {
+        describe_into(heap, name, depth - 1, text);
     }
 }
 
@@ -137,11 +155,15 @@ fn describe_object(heap: &Heap, value: Value, depth: usize, text: &mut String) {
             }
             text.push(')');
         }
-        Some(Kind::Function) => text.push_str(&format!("#<function {}>", function_name(heap, value))),
+        Some(Kind::Function) => {
+            text.push_str("#<function ");
+            describe_function_name(heap, value, depth, text);
+            text.push('>');
+        }
         Some(Kind::Structure) => {
             let class = heap.structure_class(value).unwrap_or(Value::NIL);
             text.push_str("#<");
-            describe_into(heap, class::name_of(heap, class), depth, text);
+            describe_name(heap, class::name_of(heap, class), depth, text);
             text.push('>');
         }
         Some(kind) => text.push_str(&format!("#<{}>", format!("{kind:?}").to_lowercase())),
@@ -155,4 +177,29 @@ fn describe_symbol(heap: &Heap, symbol: Value, text: &mut String) {
         text.push(':');
     }
     text.push_str(&heap.string_text(cell.name).unwrap_or_default());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::{Shape, Sort};
+    use crate::trust::{self, heap_for_tests};
+
+    #[test]
+    fn functions_that_are_names_of_functions_are_shown_to_a_depth() {
+        let mut heap = heap_for_tests();
+        let mut name = Value::small(7);
+        for level in 0..100_000 {
+            let shape = Shape::other(Sort::Undefined, 0);
+            let code =
+                trust::alloc_stub(&mut heap, name, Value::NIL, shape, 1, trust::UNDEFINED_WORD).unwrap();
+            name = trust::alloc_function(&mut heap, code, &[Value::NIL]).unwrap();
+            if level == 1 {
+                assert_eq!(describe(&heap, name), "#<function #<function 7>>");
+            }
+        }
+        let shown = "#<function #<function #<function #>>>";
+        assert_eq!(describe(&heap, name), format!("#<function {shown}>"));
+        assert_eq!(function_name(&heap, name), format!("#<function {shown}>"));
+    }
 }
