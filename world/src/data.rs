@@ -28,9 +28,22 @@ pub(crate) fn text_of_bytes(bytes: &[u8]) -> Datum {
     text(&bytes.iter().map(|&byte| char::from(byte)).collect::<String>())
 }
 
-/// Returns the bytes of such a string; other characters count as question marks.
-pub(crate) fn bytes_of(text: &str) -> Vec<u8> {
-    text.chars().map(|character| u8::try_from(u32::from(character)).unwrap_or(b'?')).collect()
+/// Returns the bytes of such a string. All bytes that a program hands to the system pass here.
+///
+/// # Errors
+/// A `:type-error` about the first character that is not a byte, by its code.
+pub(crate) fn bytes_of(text: &str) -> Result<Vec<u8>, HostFailure> {
+    let byte_of = |character: char| {
+        let code = u32::from(character);
+        u8::try_from(code).map_err(|_| not_a_byte(code))
+    };
+    text.chars().map(byte_of).collect()
+}
+
+fn not_a_byte(code: u32) -> HostFailure {
+    let name = Datum::symbol(Symbol::cl("UNSIGNED-BYTE"), Span::default());
+    let expected = Datum::list([name, integer(8)], Span::default());
+    HostFailure { cause: "TYPE-ERROR".into(), arguments: vec![integer(code), expected] }
 }
 
 /// Returns an integer as data.
@@ -91,6 +104,18 @@ impl CallArguments {
         text_of(datum).map(str::to_owned).ok_or_else(|| wrong(datum, "STRING"))
     }
 
+    /// Returns the bytes of an argument that is a string of the characters 0 to 255.
+    pub(crate) fn bytes(&self, index: usize) -> Result<Vec<u8>, HostFailure> {
+        let datum = self.get(index, "STRING")?;
+        bytes_of(text_of(datum).ok_or_else(|| wrong(datum, "STRING"))?)
+    }
+
+    /// Returns the bytes of an argument that is a text, in UTF-8; as [`CallArguments::bytes`] if the argument
+    /// at `are_bytes` is true.
+    pub(crate) fn bytes_or_text(&self, index: usize, are_bytes: usize) -> Result<Vec<u8>, HostFailure> {
+        if self.is_true(are_bytes) { self.bytes(index) } else { Ok(self.text(index)?.into_bytes()) }
+    }
+
     /// Returns an argument that is a string or `NIL`.
     pub(crate) fn text_if_any(&self, index: usize) -> Result<Option<String>, HostFailure> {
         if self.is_true(index) { self.text(index).map(Some) } else { Ok(None) }
@@ -149,4 +174,31 @@ impl CallArguments {
 
 fn wrong(datum: &Datum, expected: &str) -> HostFailure {
     HostFailure { cause: "TYPE-ERROR".into(), arguments: vec![datum.clone(), text(expected)] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_characters_below_256_are_bytes() {
+        assert_eq!(bytes_of("\0a\u{ff}").ok(), Some(vec![0, 97, 255]));
+        for (text, code) in [("a\u{100}", 256), ("\u{12c}\u{100}", 300), ("\u{10ffff}", 0x10_ffff)] {
+            let failure = bytes_of(text).expect_err("it is refused");
+            assert_eq!(failure.cause, "TYPE-ERROR");
+            let [datum, expected] = &failure.arguments[..] else { panic!("there are two") };
+            assert_eq!(
+                (datum.to_string(), expected.to_string()),
+                (code.to_string(), "(UNSIGNED-BYTE 8)".into())
+            );
+        }
+    }
+
+    #[test]
+    fn a_text_is_given_in_utf_8_or_as_bytes() {
+        let arguments = CallArguments(vec![text("\u{e9}"), nil(), boolean(true), integer(5)]);
+        assert_eq!(arguments.bytes_or_text(0, 1).ok(), Some(vec![0xc3, 0xa9]));
+        assert_eq!(arguments.bytes_or_text(0, 2).ok(), Some(vec![0xe9]));
+        assert!(arguments.bytes(3).is_err() && arguments.bytes(9).is_err());
+    }
 }

@@ -19,7 +19,7 @@ use esl_vm::embed::{HostFunction, Need};
 use esl_vm::host::{FileAnswer, FileRequest, HostError, HostFailure, Right, request_of_files};
 use esl_vm::vm::Vm;
 
-use crate::data::{CallArguments, Numbered, boolean, bytes_of, failure, handle, integer, nil, text};
+use crate::data::{CallArguments, Numbered, boolean, failure, handle, integer, nil, text};
 use crate::operation::{Completion, define, define_with_end};
 
 mod open;
@@ -112,8 +112,7 @@ pub(crate) fn install(machine: &mut Vm) {
     define_with_end(machine, "%FILE-WRITE", &[], move |arguments, mut cancelled| {
         let known = known.clone();
         async move {
-            let (open, text) = (known.get(arguments.number(0)?)?, arguments.text(1)?);
-            let bytes = if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() };
+            let (open, bytes) = (known.get(arguments.number(0)?)?, arguments.bytes_or_text(1, 2)?);
             // A disk is waited for: what is left half-written would come later, among other things.
             let is_disk = matches!(open.access, FileAccess::Parts(..));
             let target = open.clone();

@@ -22,7 +22,7 @@ use tokio::net::TcpStream;
 
 use super::{READ, SocketKind, Sockets, closed, lock, socket_failure, unless_closed};
 use crate::arrived::Arrived;
-use crate::data::{CallArguments, boolean, bytes_of, failure, integer};
+use crate::data::{CallArguments, boolean, failure, integer};
 use crate::event_loop;
 use crate::operation::{Completion, OperationFuture};
 
@@ -309,18 +309,12 @@ pub(super) fn wait(arguments: &CallArguments, sockets: &Sockets) -> OperationFut
     }
 }
 
-/// The bytes of a text to be written: the second argument, whose characters are bytes if the third says so.
-fn bytes_to_write(arguments: &CallArguments) -> Result<Vec<u8>, HostFailure> {
-    let text = arguments.text(1)?;
-    Ok(if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() })
-}
-
 /// `%SOCKET-SEND`: number, text, whether its characters are bytes. Writes as far as the system takes it
 /// without delay. Returns `NIL` if that was all; otherwise `T` if the rest is kept, and 0 if somebody else
 /// writes.
 pub(super) fn send(arguments: CallArguments, sockets: &Sockets) -> Result<Datum, HostFailure> {
     let connection = sockets.get(arguments.number(0)?)?.connection()?;
-    let bytes = bytes_to_write(&arguments)?;
+    let bytes = arguments.bytes_or_text(1, 2)?;
     let Ok(mut writer) = connection.writer.try_lock() else { return Ok(integer(0)) };
     let is_written = writer.write_at_once(&bytes).map_err(|error| socket_failure(&error))?;
     Ok(boolean(!is_written))
@@ -330,7 +324,7 @@ pub(super) fn send(arguments: CallArguments, sockets: &Sockets) -> Result<Datum,
 pub(super) async fn write(arguments: CallArguments, sockets: Sockets) -> Completion {
     let socket = sockets.get(arguments.number(0)?)?;
     let connection = socket.connection()?;
-    let bytes = bytes_to_write(&arguments)?;
+    let bytes = arguments.bytes_or_text(1, 2)?;
     let mut write = pin!(async {
         let written = connection.writer.lock().await.write(&bytes).await;
         written.map_err(|error| socket_failure(&error))

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use tokio::net::UdpSocket;
 
 use super::{READ, SocketKind, Sockets, bind_failure, lock, socket_failure, unless_closed};
-use crate::data::{CallArguments, bytes_of};
+use crate::data::CallArguments;
 use crate::operation::Completion;
 
 /// A datagram, and the address of its sender.
@@ -24,11 +24,10 @@ pub(super) async fn open(arguments: CallArguments, sockets: Sockets) -> Completi
     sockets.set(arguments.number(0)?, SocketKind::Udp(Arc::new(socket), Arc::default()), port, String::new())
 }
 
-/// `%UDP-SEND`: number, address, text, whether its characters are bytes.
+/// `%UDP-SEND`: number, address, bytes.
 pub(super) async fn send(arguments: CallArguments, sockets: Sockets) -> Completion {
     let (socket, _) = sockets.get(arguments.number(0)?)?.datagrams()?;
-    let (address, text) = (arguments.text(1)?, arguments.text(2)?);
-    let bytes = if arguments.is_true(3) { bytes_of(&text) } else { text.into_bytes() };
+    let (address, bytes) = (arguments.text(1)?, arguments.bytes(2)?);
     socket.send_to(&bytes, address).await.map_err(|error| bind_failure(&error))?;
     Ok(Vec::new())
 }

@@ -26,7 +26,7 @@ use datagram::Datagrams;
 use listener::{Listener, bind_failure};
 
 use crate::arrived::{Arrived, whole_characters};
-use crate::data::{CallArguments, bytes_of, failure, handle, integer, nil, text, text_of_bytes};
+use crate::data::{CallArguments, failure, handle, integer, nil, text, text_of_bytes};
 #[cfg(feature = "serial")]
 use crate::operation::define;
 use crate::operation::{Completion, OperationFuture, define_ready};
@@ -249,7 +249,7 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
     });
     define("%BYTES-OF-TEXT", |arguments, _| Ok(text_of_bytes(arguments.text(0)?.as_bytes())));
     define("%TEXT-OF-BYTES", |arguments, _| {
-        let bytes = bytes_of(&arguments.text(0)?);
+        let bytes = arguments.bytes(0)?;
         let used = if arguments.is_true(1) { bytes.len() } else { whole_characters(&bytes) };
         let decoded = text(&String::from_utf8_lossy(&bytes[..used]));
         Ok(Datum::list([decoded, integer(used as i64)], Span::default()))

@@ -416,8 +416,10 @@ pub(super) fn bytes_of_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut bytes = Vec::new();
     if optional(arguments, 1).is_true() {
         encode(characters, &mut bytes);
+    } else if let Some(&code) = characters.iter().find(|&&code| code > 0xFF) {
+        return vm.exchange.not_written(Value::small(code.cast_signed()), "(UNSIGNED-BYTE 8)");
     } else {
-        bytes.extend(characters.iter().map(|&code| u8::try_from(code).unwrap_or(b'?')));
+        bytes.extend(characters.iter().map(|&code| code as u8));
     }
     vm.exchange.charge_elements(bytes.len());
     Ok(vm.heap.alloc_bytes(&bytes)?)
