@@ -26,6 +26,7 @@ mod modules;
 mod monitor;
 #[cfg(unix)]
 mod mqtt;
+mod mqtt_messages;
 mod operate;
 #[cfg(unix)]
 mod patches;

@@ -12,7 +12,7 @@ use crate::eslvm;
 use crate::folder::Folder;
 
 /// A broker, which ends with this.
-struct Broker(Child);
+pub(crate) struct Broker(Child);
 
 impl Drop for Broker {
     fn drop(&mut self) {
@@ -21,13 +21,13 @@ impl Drop for Broker {
     }
 }
 
-fn broker_program() -> Option<&'static str> {
+pub(crate) fn broker_program() -> Option<&'static str> {
     let is_there = |name: &&str| Command::new(name).arg("-h").output().is_ok();
     ["mosquitto", "/usr/sbin/mosquitto"].into_iter().find(is_there)
 }
 
 /// Starts a broker on a free port of the loopback, and waits until it listens.
-fn start_broker(program: &str, folder: &Folder, more: &str) -> (Broker, u16) {
+pub(crate) fn start_broker(program: &str, folder: &Folder, more: &str) -> (Broker, u16) {
     for _ in 0..20 {
         // The port is free until somebody else takes it, which the broker says by ending.
         let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
@@ -139,7 +139,7 @@ fn start_peer(answer: &'static [u8], next: &'static [u8], stays: bool) -> u16 {
 type PeerCase = (&'static [u8], &'static [u8], bool, (&'static str, &'static str), &'static str);
 
 /// Reads a packet: its first byte, and what follows its length. Returns nothing at the end.
-fn read_packet(stream: &mut TcpStream) -> Option<(u8, Vec<u8>)> {
+pub(crate) fn read_packet(stream: &mut TcpStream) -> Option<(u8, Vec<u8>)> {
     let mut byte = [0];
     stream.read_exact(&mut byte).ok()?;
     let first = byte[0];

@@ -2,9 +2,12 @@
 //!
 //! A client has a task on the event loop, which keeps the connection up and gathers what arrives, at most
 //! [`MOST_KEPT`] messages: then it does not read on until the program has taken some. While there is no
-//! connection, publishing and subscribing fail with what is wrong.
+//! connection, publishing and subscribing fail with the reason.
+//!
+//! Guarantees: a message of level 2 that the broker repeats before it releases it is delivered once. Nothing
+//! is sent that the protocol does not allow.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{HashMap, HashSet, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -19,16 +22,22 @@ use rumqttc::{
 };
 use tokio::sync::{Notify, oneshot, watch};
 
-use crate::data::{CallArguments, Numbered, boolean, bytes_of, failure, integer, nil, text, text_of_bytes};
+use crate::data::{CallArguments, Numbered, boolean, failure, integer, nil, text, text_of_bytes};
 use crate::event_loop;
 use crate::operation::{Completion, define};
+
+mod text;
+
+use text::{check_filter, check_length, check_text, check_topic};
 
 /// Most messages that are kept for the program.
 const MOST_KEPT: usize = 1000;
 /// Requests that wait until they are sent.
 const MOST_REQUESTS: usize = 100;
-/// Most bytes of a message.
+/// Most bytes of a packet.
 const MOST_BYTES: usize = 16 << 20;
+/// Bytes of a packet with a message, beside its topic and its payload, at most.
+const MOST_BESIDE: usize = 9;
 /// Pauses before the connection is tried again: the first, and the longest.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
 /// Time that the last requests have to be sent when a client is closed.
@@ -197,15 +206,22 @@ async fn open(arguments: CallArguments, clients: Clients) -> Completion {
     let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
     let (host, port) = address.rsplit_once(':').unwrap_or((&address, "1883"));
     let port = port.parse().map_err(mqtt_failure)?;
-    let mut options = MqttOptions::new(arguments.text(2)?, host.trim_matches(['[', ']']), port);
+    let id = arguments.text(2)?;
+    check_text("name of the client", &id)?;
+    let mut options = MqttOptions::new(id, host.trim_matches(['[', ']']), port);
     let seconds = u64::try_from(arguments.integer(3)?).unwrap_or(0);
     options.set_keep_alive(Duration::from_secs(seconds));
     options.set_max_packet_size(MOST_BYTES, MOST_BYTES);
     if let Some(user) = arguments.text_if_any(4)? {
-        options.set_credentials(user, arguments.text_if_any(5)?.unwrap_or_default());
+        let password = arguments.text_if_any(5)?.unwrap_or_default();
+        check_text("user", &user)?;
+        check_length("password", password.len())?;
+        options.set_credentials(user, password);
     }
     if let Some(topic) = arguments.text_if_any(6)? {
-        let payload = bytes_of(&arguments.text(7)?);
+        let payload = arguments.bytes(7)?;
+        check_topic(&topic)?;
+        check_length("payload of the last will", payload.len())?;
         options.set_last_will(LastWill::new(
             topic,
             payload,
@@ -218,6 +234,10 @@ async fn open(arguments: CallArguments, clients: Clients) -> Completion {
         options.set_transport(Transport::tls_with_config(TlsConfiguration::Rustls(config)));
     }
     let (client, mut events) = AsyncClient::new(options, MOST_REQUESTS);
+    // An acknowledgement is small, and the other side waits for it.
+    let mut network = events.network_options();
+    network.set_tcp_nodelay(true);
+    events.set_network_options(network);
     match events.poll().await {
         Ok(_) => {}
         Err(error) => return Err(connection_failure(&error)),
@@ -239,7 +259,8 @@ async fn open(arguments: CallArguments, clients: Clients) -> Completion {
     });
     let (closing, close) = watch::channel(false);
     let (end, ended) = watch::channel(false);
-    let driver = Driver { client: client.clone(), events, shared: shared.clone(), close };
+    let driver =
+        Driver { client: client.clone(), events, shared: shared.clone(), close, delivered: HashSet::new() };
     let drive = async move {
         driver.run().await;
         // Nobody may wait for it.
@@ -268,10 +289,15 @@ fn connection_failure(error: &ConnectionError) -> HostFailure {
 /// `%MQTT-PUBLISH`: number, topic, bytes, level, whether the broker keeps it.
 async fn publish(arguments: CallArguments, clients: Clients) -> Completion {
     let client = clients.get(arguments.integer(0)?)?;
+    let (topic, bytes) = (arguments.text(1)?, arguments.bytes(2)?);
+    check_topic(&topic)?;
+    let most = MOST_BYTES - MOST_BESIDE - topic.len();
+    if bytes.len() > most {
+        return Err(mqtt_failure(format!("the payload has {} bytes: at most {most} are sent", bytes.len())));
+    }
     client.shared.check()?;
-    let (topic, bytes) = (arguments.text(1)?, bytes_of(&arguments.text(2)?));
     let level = qos(arguments.integer(3)?);
-    let refused = |_| mqtt_failure(format!("`{topic}` is no topic, or the client is closed"));
+    let refused = |_| mqtt_failure("the client is closed");
     let is_kept = arguments.is_true(4);
     if level == QoS::AtMostOnce {
         client.client.publish(topic.clone(), level, is_kept, bytes).await.map_err(refused)?;
@@ -310,14 +336,14 @@ impl Drop for PublishRequest<'_> {
 /// `%MQTT-SUBSCRIBE`: number, filter, level.
 async fn subscribe(arguments: CallArguments, clients: Clients) -> Completion {
     let client = clients.get(arguments.integer(0)?)?;
+    check_filter(&arguments.text(1)?)?;
     client.shared.check()?;
     let (filter, level) = (arguments.text(1)?, qos(arguments.integer(2)?));
     let (sender, answer) = oneshot::channel();
     {
         // In the order of the requests, which is that of the answers.
         let mut state = client.shared.state();
-        let refused =
-            |_| mqtt_failure(format!("`{filter}` is no filter of topics, or too much is under way"));
+        let refused = |_| mqtt_failure("too many pending requests");
         client.client.try_subscribe(filter.clone(), level).map_err(refused)?;
         state.subscribing.push_back(Some(sender));
         state.filters.insert(filter.clone(), level);
@@ -338,6 +364,8 @@ struct Driver {
     events: EventLoop,
     shared: Arc<ClientState>,
     close: watch::Receiver<bool>,
+    /// Numbers of the messages of level 2 that were delivered and that the broker has not released.
+    delivered: HashSet<u16>,
 }
 
 impl Driver {
@@ -355,26 +383,17 @@ impl Driver {
             };
             let Some(event) = event else { return self.say_goodbye().await };
             match event {
-                Ok(Event::Incoming(packet)) => {
-                    pause = PAUSES.0;
-                    self.take_in(packet);
-                }
-                Ok(Event::Outgoing(Outgoing::Publish(number))) if number > 0 => {
-                    let mut state = self.shared.state();
-                    if !state.sent.contains_key(&number)
-                        && let Some((_, waiting)) = state.publishing.pop_front()
-                    {
-                        state.sent.insert(number, waiting);
+                Ok(event) => {
+                    if matches!(event, Event::Incoming(_)) {
+                        pause = PAUSES.0;
                     }
+                    self.note(event);
                 }
-                Ok(Event::Outgoing(Outgoing::Subscribe(number))) => {
-                    let mut state = self.shared.state();
-                    if let Some(waiting) = state.subscribing.pop_front() {
-                        state.asked.insert(number, waiting);
-                    }
-                }
-                Ok(Event::Outgoing(_)) => {}
                 Err(error) => {
+                    // These belong to the connection that is lost, as the numbers in them do.
+                    for event in std::mem::take(&mut self.events.state.events) {
+                        self.note(event);
+                    }
                     {
                         let mut state = self.shared.state();
                         state.problem = Some(error.to_string());
@@ -394,10 +413,33 @@ impl Driver {
         }
     }
 
-    fn take_in(&self, packet: Packet) {
+    fn note(&mut self, event: Event) {
+        match event {
+            Event::Incoming(packet) => self.take_in(packet),
+            Event::Outgoing(Outgoing::Publish(number)) if number > 0 => {
+                let mut state = self.shared.state();
+                if !state.sent.contains_key(&number)
+                    && let Some((_, waiting)) = state.publishing.pop_front()
+                {
+                    state.sent.insert(number, waiting);
+                }
+            }
+            Event::Outgoing(Outgoing::Subscribe(number)) => {
+                let mut state = self.shared.state();
+                if let Some(waiting) = state.subscribing.pop_front() {
+                    state.asked.insert(number, waiting);
+                }
+            }
+            Event::Outgoing(_) => {}
+        }
+    }
+
+    fn take_in(&mut self, packet: Packet) {
         let mut state = self.shared.state();
         match packet {
             Packet::ConnAck(_) => {
+                // The broker knows nothing of an earlier session, since each begins anew.
+                self.delivered.clear();
                 state.problem = None;
                 for (filter, &level) in state.filters.clone().iter() {
                     // There is room for all but a great many, which the broker would have to know still.
@@ -419,7 +461,11 @@ impl Driver {
                     _ = waiting.send(());
                 }
             }
+            Packet::PubRel(release) => _ = self.delivered.remove(&release.pkid),
             Packet::Publish(message) => {
+                if message.qos == QoS::ExactlyOnce && !self.delivered.insert(message.pkid) {
+                    return;
+                }
                 state.messages.push_back((message.topic, message.payload.to_vec(), message.retain));
                 self.shared.came.notify_waiters();
             }
