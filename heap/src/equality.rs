@@ -100,7 +100,7 @@ fn same_rows(heap: &Heap, a: Value, b: Value, work: &mut usize) -> Option<bool> 
 }
 
 /// Returns the bits of a bit vector, up to its fill pointer.
-fn bits_of(heap: &Heap, v: Value) -> Option<&[u8]> {
+pub fn bits_of(heap: &Heap, v: Value) -> Option<&[u8]> {
     match vector_elements(heap, v)? {
         ArrayElements::Bits(bits) => Some(bits),
         _ => None,

@@ -79,6 +79,11 @@ fn variable_name(heap: &Heap, v: Value) -> Option<bool> {
 /// Returns the term of a symbol, held, if the symbol is a variable.
 type OfSymbol<'a> = dyn FnMut(&mut Terms, &mut Heap, Value) -> Result<Option<Term>, FormulaError> + 'a;
 
+/// Returns whether the term of an object is made of those of its parts.
+fn is_compound(heap: &Heap, v: Value) -> bool {
+    v.is_cons() || heap.value_slots(v).is_some()
+}
+
 /// Returns the term of an object, held; `symbol` supplies the terms of variables.
 fn convert(
     terms: &mut Terms,
@@ -90,12 +95,16 @@ fn convert(
     enum Open {
         Make(Value),
         Join,
+        /// Make a slot, in which no symbol is a variable.
+        MakeSlot(Value),
+        /// Make a structure of this class of the list of its slots.
+        Record(Value),
     }
     let mut atom = |terms: &mut Terms, heap: &mut Heap, v: Value| match symbol(terms, heap, v)? {
         Some(term) => Ok(term),
         None => terms.atom(heap, v).map_err(FormulaError::Room),
     };
-    if !v.is_cons() {
+    if !is_compound(heap, v) {
         return atom(terms, heap, v);
     }
     let mut made: Vec<Term> = Vec::new();
@@ -103,15 +112,37 @@ fn convert(
     let mut walk = || -> Result<(), FormulaError> {
         while let Some(next) = open.pop() {
             match next {
-                Open::Make(part) => match heap.as_cons(part) {
-                    Some(pair) => {
-                        *parts = parts.checked_sub(1).ok_or(FormulaError::Malformed(v, TOO_LARGE))?;
+                Open::Make(part) | Open::MakeSlot(part) => {
+                    let is_slot = matches!(next, Open::MakeSlot(_));
+                    let make = if is_slot { Open::MakeSlot } else { Open::Make };
+                    let spend = |parts: &mut usize, count| {
+                        let left = parts.checked_sub(count).ok_or(FormulaError::Malformed(v, TOO_LARGE))?;
+                        *parts = left;
+                        Ok::<_, FormulaError>(())
+                    };
+                    if let Some(pair) = heap.as_cons(part) {
+                        spend(parts, 1)?;
                         open.push(Open::Join);
-                        open.push(Open::Make(pair.cdr));
-                        open.push(Open::Make(pair.car));
+                        open.push(make(pair.cdr));
+                        open.push(make(pair.car));
+                    } else if let (Some(class), Some(slots)) =
+                        (heap.structure_class(part), heap.value_slots(part))
+                    {
+                        spend(parts, slots.len() + 1)?;
+                        open.push(Open::Record(class));
+                        open.extend(slots.iter().map(|_| Open::Join));
+                        open.push(Open::MakeSlot(Value::NIL));
+                        open.extend(slots.iter().rev().map(|&slot| Open::MakeSlot(slot)));
+                    } else if is_slot {
+                        made.push(terms.atom(heap, part)?);
+                    } else {
+                        made.push(atom(terms, heap, part)?);
                     }
-                    None => made.push(atom(terms, heap, part)?),
-                },
+                }
+                Open::Record(class) => {
+                    let slots = made.pop().unwrap_or(Term::NIL);
+                    made.push(terms.record(heap, class, slots)?);
+                }
                 Open::Join => {
                     let (cdr, car) = (made.pop().unwrap_or(Term::NIL), made.pop().unwrap_or(Term::NIL));
                     made.push(terms.pair(car, cdr).map_err(|error| formula_error(error, v))?);
@@ -275,7 +306,7 @@ impl<'a> FormulaParser<'a> {
     /// Returns the term of a part of a pattern; `held` holds it.
     fn term(&mut self, v: Value) -> Result<Term, FormulaError> {
         self.spend()?;
-        let term = match v.is_cons() {
+        let term = match is_compound(self.heap, v) {
             false => match variable_name(self.heap, v) {
                 Some(is_anonymous) => self.variable(v, is_anonymous)?,
                 None => self.terms.atom(self.heap, v)?,

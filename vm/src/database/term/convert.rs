@@ -4,7 +4,8 @@ use super::super::bucket::{finish, mix};
 use super::{Term, TermData, Terms};
 use crate::describe::describe;
 use crate::equality::{self, KeyTest};
-use crate::heap::{AllocError, Heap};
+use crate::heap::layout::StructureObject;
+use crate::heap::{AllocError, Heap, Kind};
 use crate::table::{KeyComparison, Table};
 use crate::value::Value;
 
@@ -45,7 +46,30 @@ impl Terms {
         Ok(Some(self.objects))
     }
 
-    /// Returns the term of an object other than a pair.
+    /// Returns the term of a structure that `equal` compares by its slots, of which `slots` is a list; their
+    /// holder becomes the structure's.
+    ///
+    /// # Errors
+    /// As for every allocation; the slots are released all the same.
+    pub(in crate::database) fn record(
+        &mut self,
+        heap: &mut Heap,
+        class: Value,
+        slots: Term,
+    ) -> Result<Term, AllocError> {
+        let class = match self.object(heap, class) {
+            Ok(class) => class,
+            Err(error) => {
+                self.release(slots);
+                return Err(error);
+            }
+        };
+        let hash = finish(mix(mix(9, class.bits()), slots.bits()));
+        Ok(self.intern(hash, TermData::Record(class, slots)))
+    }
+
+    /// Returns the term of an object other than a pair, and other than a structure that `equal` compares by
+    /// its slots.
     pub(in crate::database) fn atom(&mut self, heap: &mut Heap, v: Value) -> Result<Term, AllocError> {
         if !v.is_address() {
             return Ok(Term(v));
@@ -59,6 +83,11 @@ impl Terms {
             let data = TermData::Text(characters.into());
             return Ok(self.intern(hash, data));
         }
+        if let Some(bits) = equality::bits_of(heap, v) {
+            let hash = finish(bits.iter().fold(mix(7, bits.len() as u64), |h, &bit| mix(h, bit.into())));
+            let data = TermData::Bits(bits.into());
+            return Ok(self.intern(hash, data));
+        }
         if let Some(n) = heap.bignum(v) {
             let hash = finish(n.limbs.iter().fold(mix(4, n.negative.into()), |hash, &limb| mix(hash, limb)));
             let data = TermData::Big(n.negative, n.limbs.into());
@@ -69,6 +98,12 @@ impl Terms {
             let denominator = self.atom(heap, denominator)?;
             let hash = finish(mix(mix(5, numerator.bits()), denominator.bits()));
             return Ok(self.intern(hash, TermData::Ratio(numerator, denominator)));
+        }
+        if let Some((real, imaginary)) = heap.complex(v) {
+            let real = self.atom(heap, real)?;
+            let imaginary = self.atom(heap, imaginary)?;
+            let hash = finish(mix(mix(8, real.bits()), imaginary.bits()));
+            return Ok(self.intern(hash, TermData::Complex(real, imaginary)));
         }
         if let Some(x) = heap.as_double(v) {
             return Ok(self.intern(finish(mix(6, x.to_bits())), TermData::Float(x.to_bits())));
@@ -96,6 +131,8 @@ impl Terms {
         enum Open {
             Make(Term),
             Join,
+            /// Make a structure of this class.
+            Record(Value),
         }
         let mut open = vec![Open::Make(term)];
         let mut made: Vec<Value> = Vec::new();
@@ -108,11 +145,28 @@ impl Terms {
                         open.push(Open::Make(cdr));
                         open.push(Open::Make(car));
                     }
-                    None => made.push(self.atom_value(heap, term)?),
+                    None => match self.as_record(term) {
+                        Some((class, slots)) => {
+                            open.push(Open::Record(self.atom_value(heap, class)?));
+                            open.push(Open::Make(slots));
+                        }
+                        None => made.push(self.atom_value(heap, term)?),
+                    },
                 },
                 Open::Join => {
                     let (cdr, car) = (made.pop().unwrap_or(Value::NIL), made.pop().unwrap_or(Value::NIL));
                     made.push(heap.cons(car, cdr)?);
+                }
+                Open::Record(class) => {
+                    let mut slots = Vec::new();
+                    let mut rest = made.pop().unwrap_or(Value::NIL);
+                    while let Some(pair) = heap.as_cons(rest) {
+                        slots.push(pair.car);
+                        rest = pair.cdr;
+                    }
+                    let record = heap.alloc_structure(class, &slots)?;
+                    heap.set_flags(record, Kind::Structure, StructureObject::VALUE);
+                    made.push(record);
                 }
             }
         }
@@ -129,9 +183,15 @@ impl Terms {
                 let denominator = self.atom_value(heap, *denominator)?;
                 heap.alloc_ratio(numerator, denominator)
             }
+            TermData::Complex(real, imaginary) => {
+                let real = self.atom_value(heap, *real)?;
+                let imaginary = self.atom_value(heap, *imaginary)?;
+                heap.alloc_complex(real, imaginary)
+            }
+            TermData::Bits(bits) => heap.alloc_bits(bits),
             TermData::Float(bits) => heap.float(f64::from_bits(*bits)),
             TermData::Object(v) => Ok(*v),
-            TermData::Free | TermData::Pair { .. } => Ok(Value::NIL),
+            TermData::Free | TermData::Pair { .. } | TermData::Record(..) => Ok(Value::NIL),
         }
     }
 
@@ -186,6 +246,28 @@ impl Terms {
                         .map(|&code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER))
                         .collect();
                     text.push_str(&format!("{shown:?}"));
+                }
+                TermData::Bits(bits) => {
+                    text.push_str("#*");
+                    text.extend(bits.iter().take(most).map(|&bit| if bit == 0 { '0' } else { '1' }));
+                }
+                TermData::Complex(real, imaginary) => {
+                    text.push_str("#C(");
+                    open.extend([
+                        TermPiece::Word(")"),
+                        TermPiece::Term(*imaginary),
+                        TermPiece::Word(" "),
+                        TermPiece::Term(*real),
+                    ]);
+                }
+                TermData::Record(class, slots) => {
+                    text.push_str("#<");
+                    open.extend([
+                        TermPiece::Word(">"),
+                        TermPiece::Term(*slots),
+                        TermPiece::Word(" "),
+                        TermPiece::Term(*class),
+                    ]);
                 }
                 TermData::Float(bits) => text.push_str(&format!("{:?}", f64::from_bits(*bits))),
                 TermData::Ratio(numerator, denominator) => {

@@ -1,11 +1,11 @@
 //! Terms: the contents of facts. A term is one word; two terms are equal exactly when their objects are
 //! `equal`.
 //!
-//! Numbers, characters and symbols are the same words as their values. Pairs, strings and numbers too large
-//! for a word are stored once, outside of the heap, with a count of their holders; they are copies, so that a
-//! program cannot change a fact by changing an object. Any other object stands for itself. So a database of
-//! numbers, strings and named symbols, however large, gives the collector nothing to do; all other objects in
-//! facts are in one hash table of the heap, which the collector marks as any other.
+//! Numbers, characters and symbols are the same words as their values. Pairs, strings, bit vectors, pathnames
+//! and numbers too large for a word are stored once, outside of the heap, with a count of their holders; they
+//! are copies, so that a program cannot change a fact by changing an object. Any other object stands for
+//! itself. So a database of numbers, strings and named symbols, however large, gives the collector nothing to
+//! do; all other objects in facts are in one hash table of the heap, which the collector marks as any other.
 //!
 //! A function that makes a term returns it held; the caller keeps it until [`Terms::release`].
 
@@ -70,9 +70,14 @@ enum TermData {
         is_ground: bool,
     },
     Text(Box<[u32]>),
+    Bits(Box<[u8]>),
     Big(bool, Box<[u64]>),
     Ratio(Term, Term),
+    Complex(Term, Term),
     Float(u64),
+    /// A structure that `equal` compares by its slots: its class, and the list of its slots. Patterns do not
+    /// look into it.
+    Record(Term, Term),
     /// Any other object.
     Object(Value),
 }
@@ -133,9 +138,9 @@ impl Terms {
         if let Some(found) = self.buckets.find(hash, |other| self.nodes[other as usize].data == data) {
             self.nodes[found as usize].holders += 1;
             // A stored term holds its parts once, however often it is made.
-            if let TermData::Pair { car, cdr, .. } | TermData::Ratio(car, cdr) = data {
-                self.release(car);
-                self.release(cdr);
+            if let Some((left, right)) = data.parts() {
+                self.release(left);
+                self.release(right);
             }
             return Term(Value::term(found));
         }
@@ -164,13 +169,21 @@ impl Terms {
                 continue;
             };
             match &self.nodes[index as usize].data {
-                TermData::Pair { car, cdr, .. } => {
-                    visit(Ok(1));
-                    open.extend([*cdr, *car]);
+                data @ (TermData::Pair { .. }
+                | TermData::Ratio(..)
+                | TermData::Complex(..)
+                | TermData::Record(..)) => {
+                    visit(Ok(match data {
+                        TermData::Pair { .. } => 1,
+                        TermData::Ratio(..) => 2,
+                        TermData::Complex(..) => 8,
+                        _ => 9,
+                    }));
+                    open.extend(data.parts().into_iter().flat_map(|(left, right)| [right, left]));
                 }
-                TermData::Ratio(numerator, denominator) => {
-                    visit(Ok(2));
-                    open.extend([*denominator, *numerator]);
+                TermData::Bits(bits) => {
+                    visit(Ok(5 + 8 * bits.len() as u64));
+                    bits.iter().for_each(|&bit| visit(Ok(u64::from(bit))));
                 }
                 TermData::Text(characters) => {
                     visit(Ok(3 + 8 * characters.len() as u64));
@@ -225,6 +238,7 @@ impl Terms {
     fn size(&self, term: Term) -> u32 {
         match term.0.as_term().map(|index| &self.nodes[index as usize].data) {
             Some(TermData::Pair { size, .. }) => *size,
+            Some(TermData::Record(_, slots)) => self.size(*slots),
             _ => 0,
         }
     }
@@ -234,6 +248,14 @@ impl Terms {
     pub(super) fn as_pair(&self, term: Term) -> Option<(Term, Term)> {
         match self.nodes[term.0.as_term()? as usize].data {
             TermData::Pair { car, cdr, .. } => Some((car, cdr)),
+            _ => None,
+        }
+    }
+
+    /// Returns the class and the list of the slots of a structure that is compared by them.
+    fn as_record(&self, term: Term) -> Option<(Term, Term)> {
+        match self.nodes[term.0.as_term()? as usize].data {
+            TermData::Record(class, slots) => Some((class, slots)),
             _ => None,
         }
     }
@@ -272,17 +294,14 @@ impl Terms {
             self.bytes -= NODE_BYTES + data.bytes();
             self.buckets.remove(index);
             self.free.push(index);
-            match data {
-                TermData::Pair { car, cdr, .. } | TermData::Ratio(car, cdr) => {
-                    self.release(car);
-                    self.release(cdr);
-                }
-                TermData::Object(v) => {
-                    if let Some((table, hash, Some(entry))) = self.find_object(heap, v) {
-                        table.delete(heap, entry, hash);
-                    }
-                }
-                _ => {}
+            if let Some((left, right)) = data.parts() {
+                self.release(left);
+                self.release(right);
+            }
+            if let TermData::Object(v) = data
+                && let Some((table, hash, Some(entry))) = self.find_object(heap, v)
+            {
+                table.delete(heap, entry, hash);
             }
         }
     }
@@ -295,9 +314,21 @@ impl Terms {
 }
 
 impl TermData {
+    /// Returns the two terms that this holds.
+    fn parts(&self) -> Option<(Term, Term)> {
+        match *self {
+            TermData::Pair { car: left, cdr: right, .. }
+            | TermData::Ratio(left, right)
+            | TermData::Complex(left, right)
+            | TermData::Record(left, right) => Some((left, right)),
+            _ => None,
+        }
+    }
+
     fn bytes(&self) -> usize {
         match self {
             TermData::Text(characters) => 4 * characters.len(),
+            TermData::Bits(bits) => bits.len(),
             TermData::Big(_, limbs) => 8 * limbs.len(),
             _ => 0,
         }
