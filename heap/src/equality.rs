@@ -122,6 +122,10 @@ fn loosely_same(
         return Some(number::same_value(heap, a, b));
     }
     match (heap.kind(a), heap.kind(b)) {
+        (Some(Kind::Structure), Some(Kind::Structure)) if heap.value_slots(a).is_some() => {
+            // Case matters in names of files.
+            walk(heap, false, a, b, work)
+        }
         (Some(Kind::Structure), Some(Kind::Structure)) => {
             // Instances of DEFCLASS are the same only if they are one object.
             if heap.structure_class(a) != heap.structure_class(b) || heap.is_instance(a) {
