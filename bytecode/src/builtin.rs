@@ -1197,8 +1197,8 @@ macro_rules! for_each_builtin {
             /// Reads the JSON value of a string that begins at `start`: the value, the index after it, and
             /// `NIL`. If there is none, `NIL`, the index of the fault, and a text; if the value is long or
             /// deep, `NIL`, the index at which it begins, and `T`. Objects are association lists, or hash
-            /// tables.
-            JsonValue = json::value, internal "%JSON-VALUE" ("string start are-tables");
+            /// tables; the last two arguments stand for `false` and `null`.
+            JsonValue = json::value, internal "%JSON-VALUE" ("string start are-tables is-table-if-empty false null");
             /// Reads a part of a JSON string that has begun: its characters, the index after them, and `NIL`,
             /// `T` if the string has ended, or a text that says what is wrong at the index.
             JsonStringPart = json::string_part, internal "%JSON-STRING-PART" ("string start");

@@ -54,8 +54,20 @@ struct JsonReader<'a> {
     vm: &'a mut Vm,
     text: &'a [u32],
     at: usize,
+    values: JsonValues,
+}
+
+/// What the program takes for the values of a text.
+#[derive(Clone, Copy)]
+struct JsonValues {
     /// Whether objects become hash tables.
     are_tables: bool,
+    /// Whether an empty object becomes a hash table.
+    is_table_if_empty: bool,
+    /// The value for `false`.
+    no: Value,
+    /// The value for `null`.
+    null: Value,
 }
 
 fn is_blank(code: u32) -> bool {
@@ -143,11 +155,8 @@ impl JsonReader<'_> {
             Some('"') => self.string(),
             Some('-' | '0'..='9') => self.number(),
             Some('t') => self.word("true", Value::T),
-            Some('f') => self.word("false", Value::NIL),
-            Some('n') => {
-                let null = self.vm.world.keyword(&mut self.vm.heap, "NULL")?;
-                self.word("null", null)
-            }
+            Some('f') => self.word("false", self.values.no),
+            Some('n') => self.word("null", self.values.null),
             _ => Err(JsonStop::Fault(self.at, "expected a value")),
         }
     }
@@ -196,7 +205,9 @@ impl JsonReader<'_> {
                 }
             }
         }
-        if !self.are_tables {
+        let is_table =
+            if members.is_empty() { self.values.is_table_if_empty } else { self.values.are_tables };
+        if !is_table {
             let pairs: Result<Vec<Value>, _> =
                 members.into_iter().map(|(key, value)| self.vm.heap.cons(key, value)).collect();
             return Ok(self.vm.heap.list(&pairs?)?);
@@ -254,6 +265,10 @@ impl JsonReader<'_> {
         }
         let text = &self.text[start..self.at];
         if self.at == end_of_integer {
+            if text == [u32::from('-'), u32::from('0')] {
+                // No integer has a sign without a value.
+                return Ok(self.vm.heap.float(-0.0)?);
+            }
             if let Some(integer) = small_integer(text) {
                 return Ok(integer);
             }
@@ -379,9 +394,9 @@ fn place(vm: &mut Vm, string: Value, start: Value) -> Result<usize, Exit> {
     vm.exchange.index_below(start, length + 1)
 }
 
-/// `(%json-value string start are-tables)`
+/// `(%json-value string start are-tables is-table-if-empty false null)`
 pub(super) fn value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [string, start, are_tables] = exactly(arguments);
+    let [string, start, are_tables, is_table_if_empty, no, null] = exactly(arguments);
     let start = place(vm, string, start)?;
     let text = vm.heap.string(string).unwrap_or_default();
     let blanks = text[start..].iter().take(LENGTH).take_while(|&&code| is_blank(code)).count();
@@ -394,10 +409,16 @@ pub(super) fn value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         vm.exchange.charge(LENGTH / 16);
         return vm.give_values(&[Value::NIL, Value::index(start), Value::T]);
     };
+    let values = JsonValues {
+        are_tables: are_tables.is_true(),
+        is_table_if_empty: is_table_if_empty.is_true(),
+        no,
+        null,
+    };
     // One more, so that what follows the value is seen.
     let text = text[start..text.len().min(start + length + 1)].to_vec();
     vm.exchange.charge((blanks + length) / 4);
-    let mut reader = JsonReader { vm, text: &text, at: 0, are_tables: are_tables.is_true() };
+    let mut reader = JsonReader { vm, text: &text, at: 0, values };
     let result = reader.value();
     let end = start + reader.at;
     match result {
