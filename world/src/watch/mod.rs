@@ -1,4 +1,6 @@
 //! Watching paths: what is made, changed and removed there.
+//!
+//! A path is watched, not the file that it stands for at the beginning: see `follower`.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,12 +10,17 @@ use esl_bytecode::span::Span;
 use esl_vm::embed::{HostFunction, Need};
 use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
-use notify::event::ModifyKind;
-use notify::{Event, EventKind, RecommendedWatcher, RecursiveMode, Watcher};
-use tokio::sync::Notify;
+use notify::Event;
+use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
+use tokio::sync::{Notify, oneshot};
 
 use crate::data::{CallArguments, Numbered, failure, integer, nil, text};
+use crate::event_loop;
 use crate::operation::define;
+
+mod follower;
+
+use follower::{Follower, PathChange};
 
 /// Most changes that are kept for the program.
 const MOST_KEPT: usize = 10_000;
@@ -31,45 +38,80 @@ impl Changes {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn add(&self, event: notify::Result<Event>) {
-        let mut kept = self.kept();
-        let lost = |kept: &mut VecDeque<_>| {
-            kept.clear();
-            kept.push_back(("LOST", String::new()));
-        };
-        match event {
-            Ok(event) if event.need_rescan() => lost(&mut kept),
-            Ok(event) => {
-                let Some(kind) = kind_of(event.kind) else { return };
-                for path in event.paths {
-                    kept.push_back((kind, path.to_string_lossy().into_owned()));
-                }
-                if kept.len() > MOST_KEPT {
-                    lost(&mut kept);
-                }
-            }
-            Err(_) => lost(&mut kept),
+    fn add(&self, changes: Vec<PathChange>) {
+        if changes.is_empty() {
+            return;
         }
+        let mut kept = self.kept();
+        kept.extend(changes.into_iter().map(|(kind, path)| (kind, path.to_string_lossy().into_owned())));
+        let is_full = kept.len() > MOST_KEPT;
         drop(kept);
+        if is_full {
+            return self.lose();
+        }
         self.came.notify_waiters();
     }
-}
 
-/// Returns the keyword for what has happened to a path, if anything has.
-fn kind_of(kind: EventKind) -> Option<&'static str> {
-    match kind {
-        EventKind::Create(_) => Some("CREATED"),
-        EventKind::Modify(ModifyKind::Name(_)) => Some("RENAMED"),
-        EventKind::Modify(_) => Some("MODIFIED"),
-        EventKind::Remove(_) => Some("DELETED"),
-        EventKind::Any | EventKind::Access(_) | EventKind::Other => None,
+    /// Notes that changes were lost.
+    fn lose(&self) {
+        let mut kept = self.kept();
+        kept.clear();
+        kept.push_back(("LOST", String::new()));
+        drop(kept);
+        self.came.notify_waiters();
     }
 }
 
 /// A path that is watched, until this is dropped.
 struct Watched {
     changes: Arc<Changes>,
-    _watcher: RecommendedWatcher,
+    _ending: oneshot::Sender<()>,
+}
+
+/// Begins to watch a path. Returns its changes, the events of the system, and what follows the path.
+fn begin(path: String) -> notify::Result<(Arc<Changes>, Follower, UnboundedReceiver<Event>)> {
+    let changes = Arc::<Changes>::default();
+    let heard = changes.clone();
+    let (sender, events) = unbounded_channel();
+    let watcher = notify::recommended_watcher(move |event: notify::Result<Event>| match event {
+        // Nobody listens after the end.
+        Ok(event) if !event.need_rescan() => _ = sender.send(event),
+        _ => heard.lose(),
+    })?;
+    let follower = Follower::new(watcher, path.into())?;
+    Ok((changes, follower, events))
+}
+
+/// Follows a path until the other end of `ending` is dropped.
+async fn follow(
+    changes: Arc<Changes>,
+    mut follower: Follower,
+    mut events: UnboundedReceiver<Event>,
+    mut ending: oneshot::Receiver<()>,
+) {
+    loop {
+        let event = tokio::select! {
+            _ = &mut ending => return,
+            event = events.recv() => event,
+        };
+        let Some(event) = event else { return };
+        if !follower.concerns(&event) {
+            changes.add(follower.changes(&event));
+            continue;
+        }
+        // The watcher has to be asked from another thread than its own, and the system may take its time.
+        let followed = tokio::task::spawn_blocking(move || {
+            let found = follower.follow(&event);
+            (follower, found)
+        });
+        match followed.await {
+            Ok((next, found)) => {
+                follower = next;
+                changes.add(found);
+            }
+            Err(_) => return changes.lose(),
+        }
+    }
 }
 
 /// The watched paths of a machine, by number, and the greatest number so far.
@@ -120,19 +162,14 @@ pub(crate) fn install(machine: &mut Vm) {
         let known = known.clone();
         async move {
             let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
-            let begin = move || {
-                let changes = Arc::<Changes>::default();
-                let heard = changes.clone();
-                let mut watcher = notify::recommended_watcher(move |event| heard.add(event))?;
-                watcher.watch(path.as_ref(), RecursiveMode::NonRecursive)?;
-                Ok::<_, notify::Error>(Watched { changes, _watcher: watcher })
-            };
-            let begun =
-                tokio::task::spawn_blocking(begin).await.map_err(|error| failure("SIMPLE-ERROR", error))?;
-            match begun {
-                Ok(watched) => {
+            let begun = tokio::task::spawn_blocking(move || begin(path)).await;
+            match begun.map_err(|error| failure("SIMPLE-ERROR", error))? {
+                Ok((changes, follower, events)) => {
+                    let (ending, end) = oneshot::channel();
+                    let following = follow(changes.clone(), follower, events, end);
+                    event_loop::spawn(following).map_err(|error| failure("SIMPLE-ERROR", error))?;
                     if let Some(place) = known.lock().1.get_mut(&number) {
-                        *place = Some(watched);
+                        *place = Some(Watched { changes, _ending: ending });
                     }
                     Ok(vec![integer(number)])
                 }
