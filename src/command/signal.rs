@@ -1,4 +1,8 @@
 //! Signals of the operating system, passed on to the machine: the first one asks the run to end.
+//!
+//! Guarantees: of the signals by which the system ends a process that does not handle them, each ends the run
+//! with its cleanups, but for SIGKILL and for those that report a fault of the process itself (`FAULTS`).
+//! SIGPIPE and SIGXFSZ end nothing: the write fails.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -25,8 +29,8 @@ impl Interrupts {
 pub fn interrupt_on_signal(inbox: Inbox, end: impl Fn(ProcessSignal) + Send + 'static) -> Interrupts {
     let was_asked = Arc::new(AtomicBool::new(false));
     let interrupts = Interrupts { was_asked: was_asked.clone() };
-    let all = [ProcessSignal::HangUp, ProcessSignal::Interrupt, ProcessSignal::Terminate];
-    on_signal(&all, move |signal| {
+    // The line editor has a handler of its own for the size of the terminal.
+    on_signal(false, move |signal| {
         if inbox.is_handled(signal) {
             return inbox.put(Incoming::Signal(signal));
         }
@@ -67,9 +71,11 @@ impl SignalTarget {
 /// third one ends the process whatever the machine does.
 pub fn end_on_signal(target: SignalTarget) {
     let interrupts = AtomicUsize::new(0);
-    let all = [ProcessSignal::HangUp, ProcessSignal::Interrupt, ProcessSignal::Terminate];
-    on_signal(&all, move |signal| {
+    on_signal(true, move |signal| {
         let inbox = target.lock();
+        if !signal.ends_a_run() && !inbox.is_handled(signal) {
+            return;
+        }
         if !inbox.is_handled(signal)
             && signal == ProcessSignal::Interrupt
             && interrupts.fetch_add(1, Ordering::Relaxed) > 1
@@ -81,27 +87,61 @@ pub fn end_on_signal(target: SignalTarget) {
     });
 }
 
-/// Calls `handler` on a thread of its own with each of these signals that comes.
+/// Signals that report a fault of the process, after which nothing of it can be relied on: SIGILL, SIGTRAP,
+/// SIGBUS, SIGFPE, SIGSEGV. SIGKILL and SIGSTOP cannot be handled.
 #[cfg(unix)]
-fn on_signal(signals: &[ProcessSignal], handler: impl Fn(ProcessSignal) + Send + 'static) {
-    let signals = signals.to_vec();
-    let numbers: Vec<i32> = signals.iter().map(|signal| signal.number().into()).collect();
-    // Without a handler a signal ends the process at once, which is the next best thing.
-    let Ok(mut coming) = signal_hook::iterator::Signals::new(numbers) else { return };
-    let pass_on = move || {
-        for number in coming.forever() {
-            signals
-                .iter()
-                .filter(|signal| i32::from(signal.number()) == number)
-                .for_each(|&signal| handler(signal));
-        }
+const FAULTS: [i32; 5] = {
+    use signal_hook::consts::{SIGBUS, SIGFPE, SIGILL, SIGSEGV, SIGTRAP};
+    [SIGILL, SIGTRAP, SIGBUS, SIGFPE, SIGSEGV]
+};
+
+/// Returns the signal of a number of the system's, if it is to be passed on to the machine.
+#[cfg(unix)]
+fn signal_of(number: i32) -> Option<ProcessSignal> {
+    use signal_hook::consts as known;
+    Some(match number {
+        known::SIGHUP => ProcessSignal::HangUp,
+        known::SIGINT => ProcessSignal::Interrupt,
+        known::SIGUSR1 => ProcessSignal::User1,
+        known::SIGUSR2 => ProcessSignal::User2,
+        known::SIGTERM => ProcessSignal::Terminate,
+        known::SIGWINCH => ProcessSignal::Window,
+        // What the system does for these by default is to stop the process, to let it go on, or nothing.
+        known::SIGCHLD | known::SIGCONT | known::SIGURG => return None,
+        known::SIGSTOP | known::SIGTSTP | known::SIGTTIN | known::SIGTTOU => return None,
+        // The write fails, as it does for a full disk.
+        known::SIGPIPE | known::SIGXFSZ => return None,
+        known::SIGKILL => return None,
+        fault if FAULTS.contains(&fault) => return None,
+        // The C library keeps 32 and 33 for itself.
+        other @ (1..=31 | 34..=64) => ProcessSignal::Other(u8::try_from(other).ok()?),
+        _ => return None,
+    })
+}
+
+/// Calls `handler` on a thread of its own with each signal that comes, of those that are passed on to the
+/// machine; SIGWINCH only `with_window`.
+#[cfg(unix)]
+fn on_signal(with_window: bool, handler: impl Fn(ProcessSignal) + Send + 'static) {
+    // A signal without a handler would end the process. Children have the system's own handling again, as
+    // they would not if this one were ignored.
+    _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
+    let is_wanted = |&number: &i32| {
+        signal_of(number).is_some_and(|signal| with_window || signal != ProcessSignal::Window)
     };
+    // Without a handler a signal ends the process at once, which is the next best thing.
+    let Ok(mut coming) = signal_hook::iterator::Signals::new(std::iter::empty::<i32>()) else { return };
+    for number in (1..=64).filter(is_wanted) {
+        // The system may not have it.
+        _ = coming.add_signal(number);
+    }
+    let pass_on = move || coming.forever().filter_map(signal_of).for_each(handler);
     drop(std::thread::Builder::new().name("signals".into()).spawn(pass_on));
 }
 
 /// Calls `handler` on a thread of its own with each Ctrl-C.
 #[cfg(not(unix))]
-fn on_signal(_signals: &[ProcessSignal], handler: impl Fn(ProcessSignal) + Send + 'static) {
+fn on_signal(_with_window: bool, handler: impl Fn(ProcessSignal) + Send + 'static) {
     // Without a handler Ctrl-C ends the process at once, which is the next best thing.
     drop(ctrlc::set_handler(move || handler(ProcessSignal::Interrupt)));
 }

@@ -188,6 +188,96 @@ fn a_signal_that_the_program_handles_does_not_end_it() {
     assert_eq!((ended.status, &*ended.errors), (Some(0), ""));
 }
 
+/// Each signal by which the system ends a process ends the run with its cleanups, but for those that report
+/// a fault of the process itself.
+#[cfg(target_os = "linux")]
+#[test]
+fn whatever_signal_ends_a_run_the_motors_are_switched_off() {
+    for number in [1, 2, 3, 6, 10, 12, 14, 15, 16, 24, 26, 27, 29, 30, 31, 34, 64] {
+        let text = "(format t \"begun~%\")
+                    (finish-output)
+                    (unwind-protect (loop (sleep 0.01)) (format t \"off~%\"))";
+        let running = Running::start(&format!("signal-{number}"), text);
+        running.send(&format!("-{number}"));
+        let ended = running.end();
+        let expected = (Some(128 + number), "off\n");
+        assert_eq!((ended.status, &*ended.output), expected, "{number}: {}", ended.errors);
+    }
+}
+
+#[test]
+fn a_program_handles_signals_whose_meaning_is_its_own() {
+    let text = "(define-input seen :capacity 9)
+(on-signal :usr1 (signal seen 'usr1))
+(on-signal :winch (signal seen 'winch))
+(on-signal :hup (signal seen 'hup))
+(format t \"begun~%\")
+(finish-output)
+(loop repeat 4 do (format t \"~a~%\" (wait-for-event seen)) (finish-output))
+(on-signal :usr2 (exit 3))
+(format t \"more~%\")
+(finish-output)
+(wait-for-event (make-event))";
+    let mut running = Running::start("users-signals", text);
+    for (signal, name) in [("-USR1", "USR1"), ("-WINCH", "WINCH"), ("-HUP", "HUP"), ("-USR1", "USR1")] {
+        running.send(signal);
+        assert_eq!(running.line(), name);
+    }
+    assert_eq!(running.line(), "more");
+    running.send("-USR2");
+    let ended = running.end();
+    assert_eq!((ended.status, &*ended.errors), (Some(3), ""));
+}
+
+/// Another size of the terminal, a pipe without a reader, and a stop end nothing.
+#[test]
+fn signals_that_are_not_for_the_program_change_nothing() {
+    let text =
+        "(format t \"begun~%\") (finish-output) (read-line *standard-input* nil) (sleep 0.3) (print 'end)";
+    let running = Running::start("no-signals", text);
+    for signal in ["-WINCH", "-URG", "-CHLD", "-PIPE", "-STOP", "-CONT"] {
+        running.send(signal);
+    }
+    let ended = running.end();
+    assert_eq!((ended.status, ended.output.trim(), &*ended.errors), (Some(0), "END", ""));
+}
+
+/// Beyond the limit of the size of files a write fails, and the program goes on.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_limit_of_the_size_of_files_fails_the_write() {
+    let text = "(defun write-much () (with-open-file (s \"large\" :direction :output)
+                    (dotimes (i 100000) (write-string \"0123456789\" s))))
+(unwind-protect
+     (print (handler-case (write-much) (error (e) (type-of e))))
+  (print 'off))";
+    let folder = Folder::with("size-limit", &[("program.esl", text)]);
+    let program = crate::ESLVM;
+    let mut command = Command::new("sh");
+    command.args(["-c", "ulimit -f 100; exec \"$0\" run program.esl", program]).current_dir(folder.path());
+    let run = process::run(&mut command, "");
+    assert_eq!(run.status, Some(0), "{}", run.errors);
+    assert_eq!(run.output.split_whitespace().collect::<Vec<_>>(), ["STREAM-ERROR", "OFF"], "{}", run.errors);
+}
+
+/// A program whose output nobody reads ends with its cleanups, and with a status that is no success.
+#[test]
+fn an_output_that_nobody_reads_ends_the_run_as_sigpipe_does() {
+    let text = "(unwind-protect (loop (format t \"line~%\"))
+  (with-open-file (s \"off\" :direction :output) (write-line \"off\" s)))";
+    let folder = Folder::with("no-reader", &[("program.esl", text)]);
+    let mut command = eslvm(&["run", "program.esl"]);
+    command.current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the command is there");
+    let mut output = BufReader::new(child.stdout.take().expect("the output is a pipe"));
+    output.read_line(&mut String::new()).expect("the program begins");
+    drop(output);
+    let done = child.wait_with_output().expect("a child can be waited for");
+    let errors = String::from_utf8_lossy(&done.stderr);
+    assert_eq!((done.status.code(), &*errors), (Some(141), ""));
+    assert!(folder.path().join("off").exists());
+}
+
 #[test]
 fn a_signal_ends_a_session_of_the_repl_with_its_cleanups() {
     for (signal, status) in [("-TERM", 143), ("-HUP", 129)] {

@@ -57,9 +57,10 @@ pub(crate) fn compiling(file: &Path, is_quiet: bool, compile: impl FnOnce() -> C
 
 /// Prints that a signal has ended the run.
 pub(crate) fn complain_of_signal(signal: ProcessSignal) {
-    complain(match signal {
-        ProcessSignal::HangUp => "hung up",
-        ProcessSignal::Interrupt => "interrupted",
-        ProcessSignal::Terminate => "terminated",
-    });
+    match signal {
+        ProcessSignal::HangUp => complain("hung up"),
+        ProcessSignal::Interrupt => complain("interrupted"),
+        ProcessSignal::Terminate => complain("terminated"),
+        other => complain(format_args!("ended by signal {}", other.number())),
+    }
 }

@@ -427,8 +427,9 @@ pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn on_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [number, function] = exactly(arguments);
-    let Some(signal) = number.as_index().and_then(ProcessSignal::from_number) else {
-        return vm.exchange.not_written(number, "(MEMBER 1 2 15)");
+    let signal = number.as_index().and_then(ProcessSignal::from_number);
+    let Some(signal) = signal.filter(|signal| signal.can_be_handled()) else {
+        return vm.exchange.not_written(number, "(MEMBER 1 2 10 12 15 28)");
     };
     let function = vm.callable(function)?;
     vm.embedder.pin(&mut vm.heap, function);

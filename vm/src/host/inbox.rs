@@ -172,7 +172,7 @@ impl Inbox {
 
     /// Returns whether the program handles a signal of the process, so that it does not end the run.
     pub fn is_handled(&self, signal: ProcessSignal) -> bool {
-        self.0.handled.load(Ordering::Relaxed) >> signal.number() & 1 != 0
+        signal.can_be_handled() && self.0.handled.load(Ordering::Relaxed) >> signal.number() & 1 != 0
     }
 
     /// Returns whether the machine should look.

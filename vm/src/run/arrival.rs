@@ -110,14 +110,18 @@ fn admit_observers(vm: &mut Vm) {
     }
 }
 
-/// Ends the run because of a signal, or the task that was named; a signal that no task is named for waits for
-/// the next one. Returns whether the signal cuts the end of the run short.
+/// Ends the run because of a signal, or the task that was named, unless the program handles the signal, or
+/// nothing ends for it; a signal that no task is named for waits for the next one. Returns whether the signal
+/// cuts the end of the run short.
 fn end_by_signal(vm: &mut Vm, signal: ProcessSignal) -> bool {
     let embedder = &mut vm.embedder;
     if !embedder.is_ending
         && let Some(&function) = embedder.handlers.get(&signal.number())
     {
         handle_signal(vm, function);
+        return false;
+    }
+    if !signal.ends_a_run() {
         return false;
     }
     if embedder.is_ending {
