@@ -334,10 +334,10 @@ pub trait Host {
         self.inbox().take()
     }
 
-    /// Returns the exit status of a program whose standard output nobody reads any more, which is not the
-    /// program's fault.
+    /// Returns the exit status of a program whose standard output nobody reads any more: that of a program
+    /// that SIGPIPE has ended.
     fn broken_output_status(&self) -> u8 {
-        0
+        128 + 13
     }
 
     /// Is told that the system has refused memory, which may change the course of the run: when a task next
