@@ -30,6 +30,8 @@ pub const VARIABLE: &str = "ESL_LIBRARY";
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ModulePath {
     folders: Vec<PathBuf>,
+    /// The file of the program, if it is one.
+    program: Option<PathBuf>,
 }
 
 /// Reason why a module is not found, or cannot be used.
@@ -90,6 +92,10 @@ impl ModulePath {
     /// of [`VARIABLE`].
     pub fn new<'a>(files: impl IntoIterator<Item = &'a Path>, folders: &[PathBuf]) -> ModulePath {
         let mut path = ModulePath::none();
+        let files: Vec<&Path> = files.into_iter().collect();
+        if let [file] = files[..] {
+            path.program = Some(file.to_path_buf()).filter(|file| file.as_os_str() != "-");
+        }
         for file in files {
             let folder = file.parent().filter(|_| file.as_os_str() != "-").unwrap_or(Path::new(""));
             path.add(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
@@ -109,6 +115,14 @@ impl ModulePath {
         if !self.folders.iter().any(|known| known == folder) {
             self.folders.push(folder.to_path_buf());
         }
+    }
+
+    /// Returns the name of the file of the program as it was given, and its name from the root on after all
+    /// links; nothing if the program is not one file.
+    pub fn program_file(&self) -> Vec<String> {
+        let Some(file) = &self.program else { return Vec::new() };
+        let found = file.canonicalize().unwrap_or_else(|_| file.clone());
+        [file, &found].map(|path| path.to_string_lossy().into_owned()).to_vec()
     }
 
     /// Returns the folders.

@@ -1247,6 +1247,9 @@ macro_rules! for_each_builtin {
             FileWriteDate = file::file_write_date, internal "%FILE-WRITE-DATE" ("path");
             /// Makes a folder, and those around it; whether it was not there.
             MakeFolders = file::make_folders, internal "%MAKE-FOLDERS" ("path");
+            /// The name of a file or folder after all links, from the root on, with a slash after that of a
+            /// folder; `NIL` if there is none.
+            TrueName = file::true_name, internal "%TRUE-NAME" ("path");
             /// Removes a file.
             DeleteFile = stream::delete_file, internal "%DELETE-FILE" ("path");
             /// The bytes of a file.

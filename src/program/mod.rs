@@ -37,7 +37,7 @@ pub(crate) use run::end;
 pub use run::{
     Ended, Summary, begin, finish, machine, run, run_by, run_in, run_in_portions, set_module_path, set_traces,
 };
-pub(crate) use run::{begin_with, end_rest, load, set_module_folders};
+pub(crate) use run::{begin_with, end_rest, load, set_module_folders, set_program_file};
 
 /// A source text and its name in diagnostics and backtraces.
 #[derive(Clone, Debug)]

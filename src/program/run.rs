@@ -84,14 +84,30 @@ pub fn set_traces(machine: &mut Vm, traces: &[String]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Has `require` search the folders of `path`.
+/// Has `require` search the folders of `path`, and tells the program its file.
 ///
 /// # Errors
 /// [`Error::NoMemory`].
 pub fn set_module_path(machine: &mut Vm, path: &ModulePath) -> Result<(), Error> {
     let folders: Vec<String> =
         path.folders().iter().map(|folder| folder.to_string_lossy().into_owned()).collect();
-    set_module_folders(machine, &folders)
+    set_module_folders(machine, &folders)?;
+    set_program_file(machine, &path.program_file())
+}
+
+/// Tells the program the names of its file, as [`ModulePath::program_file`] returns them.
+///
+/// # Errors
+/// [`Error::NoMemory`].
+pub(crate) fn set_program_file(machine: &mut Vm, names: &[String]) -> Result<(), Error> {
+    if names.is_empty() {
+        return Ok(());
+    }
+    call_with_list(
+        machine,
+        "%SET-PROGRAM-FILE",
+        names.iter().map(|name| Datum::string(name, Span::default())),
+    )
 }
 
 /// Has `require` search these folders.

@@ -35,7 +35,7 @@ use crate::program::ExecutionIdentity;
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
 /// The version of the format that this library reads and writes.
-pub const FORMAT: u32 = 3;
+pub const FORMAT: u32 = 4;
 
 /// Length of what is before the content of a frame.
 const FRAME: usize = 11;
@@ -74,6 +74,8 @@ pub struct Beginning {
     pub traces: Vec<String>,
     /// The folders in which modules are looked for.
     pub folders: Vec<String>,
+    /// The names of the file of the program, if it was one.
+    pub program_file: Vec<String>,
     /// The schedule by which tasks take turns, as a text, if there is one.
     pub schedule: Option<String>,
     /// The functions of the embedder's.
@@ -169,6 +171,7 @@ pub(super) fn beginning_bytes(beginning: &Beginning) -> Vec<u8> {
     write_config(&mut out, &beginning.config);
     out.list(&beginning.traces, |out, text| out.text(text));
     out.list(&beginning.folders, |out, text| out.text(text));
+    out.list(&beginning.program_file, |out, text| out.text(text));
     out.list(beginning.schedule.as_slice(), |out, text| out.text(text));
     out.list(&beginning.functions, |out, function| {
         out.text(&function.name);
@@ -189,6 +192,7 @@ fn read_beginning(content: &[u8]) -> Option<Beginning> {
     let config = read_config(&mut from)?;
     let traces = from.list(|from| Some(from.text()?.into()))?;
     let folders = from.list(|from| Some(from.text()?.into()))?;
+    let program_file = from.list(|from| Some(from.text()?.into()))?;
     let mut schedules: Vec<String> = from.list(|from| Some(from.text()?.into()))?;
     let schedule = schedules.pop();
     let functions = from.list(|from| {
@@ -201,7 +205,16 @@ fn read_beginning(content: &[u8]) -> Option<Beginning> {
         Some(GivenFunction { name, is_operation, needs })
     })?;
     let program = from.bytes()?.to_vec();
-    from.is_empty().then_some(Beginning { program, config, traces, folders, schedule, functions, identity })
+    from.is_empty().then_some(Beginning {
+        program,
+        config,
+        traces,
+        folders,
+        program_file,
+        schedule,
+        functions,
+        identity,
+    })
 }
 
 fn decompress(bytes: &[u8], length: usize) -> Option<Vec<u8>> {

@@ -71,6 +71,10 @@ pub struct RunSetup {
     pub traces: Vec<String>,
     /// The folders in which `require` looks for modules.
     pub folders: Vec<String>,
+    /// The names of the file of the program, as [`ModulePath::program_file`] returns them.
+    ///
+    /// [`ModulePath::program_file`]: crate::module_path::ModulePath::program_file
+    pub program_file: Vec<String>,
     /// The schedule by which the tasks of the program take turns, if it has one. It is for the caller to run
     /// the program by it.
     pub schedule: Option<Schedule>,
@@ -124,6 +128,7 @@ pub fn record(
     prepare(&mut machine);
     recorder.begin(&beginning(program, setup, &machine).map_err(ReplayError::Program)?);
     program::set_module_folders(&mut machine, &setup.folders).map_err(ReplayError::Machine)?;
+    program::set_program_file(&mut machine, &setup.program_file).map_err(ReplayError::Machine)?;
     program::set_traces(&mut machine, &setup.traces).map_err(ReplayError::Machine)?;
     let summary = program::run_in(&mut machine, program).map_err(ReplayError::Machine)?;
     recorder.end(&machine, exit_status(summary.ended)).map_err(ReplayError::File)?;
@@ -146,6 +151,7 @@ pub fn beginning(program: &Program, setup: &RunSetup, machine: &Vm) -> Result<Be
         config: setup.config.clone(),
         traces: setup.traces.clone(),
         folders: setup.folders.clone(),
+        program_file: setup.program_file.clone(),
         schedule: setup.schedule.as_ref().map(Schedule::to_string),
         functions: functions.collect(),
         identity: ExecutionIdentity::current().to_string(),

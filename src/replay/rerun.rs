@@ -188,6 +188,7 @@ fn begin(recorded: &Recorded, program: &Program, host: ReplayHost) -> Result<(Vm
         machine.add_guarded_function(&given.name, function, &given.needs);
     }
     program::set_module_folders(&mut machine, &beginning.folders)?;
+    program::set_program_file(&mut machine, &beginning.program_file)?;
     program::set_traces(&mut machine, &beginning.traces)?;
     let main = program::begin(&mut machine, program)?;
     Ok((machine, main))

@@ -86,6 +86,7 @@ fn beginning() -> Beginning {
         config: Config { budget: Some(9), stack: Some(1 << 20), ..Config::DEFAULT },
         traces: vec!["tasks".into()],
         folders: vec![".".into()],
+        program_file: vec!["main.esl".into(), "/main.esl".into()],
         functions: vec![GivenFunction { name: "F".into(), is_operation: true, needs: Vec::new() }],
         identity: ExecutionIdentity::current().to_string(),
     }

@@ -30,6 +30,7 @@ mod mqtt_messages;
 mod operate;
 #[cfg(unix)]
 mod patches;
+mod paths;
 mod peers;
 #[cfg(unix)]
 mod playground;

@@ -88,7 +88,8 @@ pub(crate) fn run(
     if let Some((recorder, path_of_record)) = &recording {
         let folders = path.folders().iter().map(|folder| folder.to_string_lossy().into_owned()).collect();
         let schedule = schedule.cloned();
-        let setup = RunSetup { config: options.config(), traces: trace.to_vec(), folders, schedule };
+        let (traces, program_file) = (trace.to_vec(), path.program_file());
+        let setup = RunSetup { config: options.config(), traces, folders, program_file, schedule };
         let beginning = replay::beginning(&program, &setup, &machine).map_err(|error| {
             complain(format_args!("{} cannot be recorded: {error}", path_of_record.display()));
             USAGE

@@ -5,7 +5,7 @@ use crate::builtins::outside::UNIX_EPOCH;
 use crate::builtins::rights::demand;
 use crate::builtins::stream::file_error;
 use crate::builtins::symbol::text_of;
-use crate::host::{FileAnswer, FileRequest, Host, Right};
+use crate::host::{FileAnswer, FileRequest, Host, HostError, Right};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -37,6 +37,19 @@ pub(super) fn list_folder(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         strings.push(vm.heap.alloc_str(&name)?);
     }
     Ok(vm.heap.list(&strings)?)
+}
+
+/// `(%true-name path)`
+pub(super) fn true_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (path, permitted) = permitted(vm, arguments[0], Right::Read)?;
+    match vm.outside.host.request_of_files(FileRequest::TrueName(&permitted)) {
+        Ok(FileAnswer::Names(names)) => match names.first() {
+            Some(name) => Ok(vm.heap.alloc_str(name)?),
+            None => Ok(Value::NIL),
+        },
+        Ok(_) | Err(HostError::NotFound) => Ok(Value::NIL),
+        Err(error) => file_error(&mut vm.exchange, "probed", &path, &error),
+    }
 }
 
 /// `(%rename-file path new-path)`

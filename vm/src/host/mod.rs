@@ -95,6 +95,8 @@ pub enum FileRequest<'a> {
     Date(&'a str),
     /// Makes a folder, and those around it.
     MakeFolders(&'a str),
+    /// The name of a file or folder after all links, from the root on; that of a folder ends in `/`.
+    TrueName(&'a str),
 }
 
 /// What comes of a [`FileRequest`].

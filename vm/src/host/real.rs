@@ -378,12 +378,29 @@ pub fn request_of_files(request: FileRequest<'_>) -> Result<FileAnswer, HostErro
                 FileAnswer::Date(since.map_or_else(|before| -seconds(before.duration()), seconds))
             })
         }
+        FileRequest::TrueName(path) => true_name(path).map(|name| FileAnswer::Names(vec![name])),
         FileRequest::MakeFolders(path) => {
             let is_there = std::path::Path::new(path).is_dir();
             std::fs::create_dir_all(path).map(|()| FileAnswer::Done(!is_there))
         }
     };
     answer.map_err(|error| error_of(&error))
+}
+
+fn true_name(path: &str) -> std::io::Result<String> {
+    use std::io::{Error, ErrorKind};
+    let found = std::fs::canonicalize(path).map_err(|error| match error.kind() {
+        // A part of the path is a file.
+        ErrorKind::NotADirectory => ErrorKind::NotFound.into(),
+        _ => error,
+    })?;
+    let is_folder = found.is_dir();
+    let name = found.into_os_string().into_string();
+    let mut name = name.map_err(|_| Error::other("its name is not text"))?;
+    if is_folder && !name.ends_with('/') {
+        name.push('/');
+    }
+    Ok(name)
 }
 
 #[cfg(test)]

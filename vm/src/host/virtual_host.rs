@@ -330,6 +330,14 @@ impl Host for VirtualHost {
                 Ok(FileAnswer::Date(now.div_euclid(1_000_000_000)))
             }
             FileRequest::Date(_) => Err(HostError::NotFound),
+            FileRequest::TrueName(path) if contents.files.contains_key(path) => {
+                Ok(FileAnswer::Names(vec![path.to_owned()]))
+            }
+            FileRequest::TrueName(path) => {
+                let folder = if path.is_empty() { String::new() } else { format!("{path}/") };
+                let is_there = contents.files.keys().any(|name| name.starts_with(&folder));
+                if is_there { Ok(FileAnswer::Names(vec![folder])) } else { Err(HostError::NotFound) }
+            }
             FileRequest::MakeFolders(_) => Ok(FileAnswer::Done(false)),
         }
     }

@@ -164,6 +164,16 @@ fn define_requests(machine: &mut Vm) {
         let path = arguments.text(0)?;
         requested(move || request_of_files(FileRequest::List(&path))).await
     });
+    define(machine, "%FILE-TRUE-NAME", &read, |arguments| async move {
+        let path = arguments.text(0)?;
+        let request = move || Ok(request_of_files(FileRequest::TrueName(&path)));
+        let result = in_thread(request).await.unwrap_or_else(|error| Err(HostError::from(&error)));
+        Ok(match result {
+            Ok(FileAnswer::Names(names)) => vec![names.first().map_or_else(nil, |name| text(name))],
+            Ok(_) | Err(HostError::NotFound) => vec![nil()],
+            Err(error) => vec![nil(), text(&error.to_string())],
+        })
+    });
     define(machine, "%FILE-DATE", &read, |arguments| async move {
         let path = arguments.text(0)?;
         requested(move || request_of_files(FileRequest::Date(&path))).await
