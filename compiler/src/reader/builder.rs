@@ -179,7 +179,14 @@ impl<'a> DatumBuilder<'a> {
             Ok(symbol) => Datum::symbol(symbol, span),
             Err(InternError::NoPackage(package)) => {
                 let message = format!("expected the name of a package, found `{}`", shorten(&package));
-                self.fail(code::UNKNOWN_PACKAGE.at(span, message))
+                let fault = code::UNKNOWN_PACKAGE.at(span, message);
+                self.fail(match &*package {
+                    "QL" | "QUICKLISP" | "ASDF" | "UIOP" => fault.help(
+                        "there are no Quicklisp and ASDF: copy the library's files beside the program, and write \
+                         `(require \"NAME\")` for `NAME.esl`",
+                    ),
+                    _ => fault,
+                })
             }
             Err(InternError::NotExternal { exists: true }) => {
                 let message = format!("`{}` is internal to the package `{prefix}`", shorten(name));

@@ -331,7 +331,14 @@ impl CompilationState {
     fn give_up(&mut self) -> Step {
         let mut errors = self.diagnostics.iter_mut().rev();
         if let Some(last) = errors.find(|diagnostic| diagnostic.severity == Severity::Error) {
-            last.help.get_or_insert("what follows is not compiled, since its names depend on this".into());
+            let help = if last.code == code::UNKNOWN_PACKAGE.name {
+                "what follows is not compiled, since its names depend on this. The whole file is compiled before \
+                 any of it runs, `load` too: if another file makes the package, call that `NAME.esl`, and write \
+                 `(require \"NAME\")`"
+            } else {
+                "what follows is not compiled, since its names depend on this"
+            };
+            last.help.get_or_insert(help.into());
         }
         self.end()
     }
