@@ -100,10 +100,13 @@ impl Playground {
         json!({ "diagnostics": diagnostics, "printed": printed, "runs": error.is_none(), "error": error })
     }
 
-    /// Returns the text with its lines indented.
+    /// Returns the text as it is formatted; one that cannot be read with its lines indented.
     pub fn format(&self, text: &str) -> String {
         let tree = SyntaxTree::new(text);
-        format::format(&tree, &Styles::standard(), None)
+        let styles = Styles::standard();
+        let edits = format::format_edits(&tree, &styles, None)
+            .unwrap_or_else(|_| format::indent_edits(&tree, &styles, None));
+        format::Edit::apply(text, &edits)
     }
 
     /// Runs so many ticks. Returns what was printed, the time of the program, and how it has ended if it has.

@@ -33,7 +33,7 @@ pub struct FormatOptions {
     /// Write nothing; show what would change, with status 1 if anything would
     #[arg(long)]
     pub diff: bool,
-    /// Indent only these lines, counted from 1, the last included
+    /// Format only these lines, counted from 1, the last included
     #[arg(long, value_name = "A:B", value_parser = parse_lines)]
     pub lines: Option<(usize, usize)>,
 }
@@ -53,7 +53,12 @@ pub fn format_files(options: &FormatOptions, folders: &[PathBuf]) -> u8 {
     let mut files = Vec::new();
     for path in &options.files {
         if path.as_os_str() != "-" && path.is_dir() {
+            let before = files.len();
             add_folder(path, 0, &mut files);
+            if files.len() == before {
+                complain(format_args!("{} holds no file `*.esl`", path.display()));
+                return USAGE;
+            }
         } else {
             files.push(path.clone());
         }
@@ -97,7 +102,13 @@ fn format_file(file: &Path, options: &FormatOptions, folders: &[PathBuf]) -> u8 
     let tree = SyntaxTree::new(&*source.text);
     let styles = styles_of(&tree, &ModulePath::new([file], folders));
     let lines: Option<RangeInclusive<usize>> = options.lines.map(|(first, last)| first - 1..=last - 1);
-    let formatted = format(&tree, &styles, lines);
+    let formatted = match format(&tree, &styles, lines) {
+        Ok(formatted) => formatted,
+        Err(error) => {
+            complain(format_args!("{} is left as it is: {error}", source.name));
+            return NOT_COMPILED;
+        }
+    };
     let is_changed = *source.text != *formatted;
     if options.check || options.diff {
         return show(&source, &formatted, options, is_changed);
@@ -182,7 +193,7 @@ pub(crate) fn required(tree: &SyntaxTree) -> Vec<String> {
 }
 
 /// Returns the name of the module that the argument of `require` denotes: a string, or a symbol.
-fn module_name(argument: &str) -> Option<String> {
+pub(crate) fn module_name(argument: &str) -> Option<String> {
     if let Some(text) = argument.strip_prefix('"') {
         return text.strip_suffix('"').map(str::to_owned);
     }

@@ -76,7 +76,7 @@ impl Styles {
         let keys = || body([Form], keyed(Data, Form));
         let handlers = || body([Form], function());
         let forms = |heads: usize| body(vec![Form; heads], Form);
-        let rows: [(&str, Indentation); 27] = [
+        let rows: [(&str, Indentation); 28] = [
             ("block catch eval-when unless when return-from prog1 the-environment", forms(1)),
             ("multiple-value-call multiple-value-prog1 multiple-value-setq %with-failure-cleanup", forms(1)),
             ("progn locally", sequence(Form)),
@@ -99,6 +99,7 @@ impl Styles {
                 "defun defmacro deftype define-compiler-macro define-setf-expander",
                 body([Data, Parameters], Form),
             ),
+            ("defvar defparameter defconstant", Indentation::Body([Data, Form].into(), 2, Arc::new(Form))),
             ("defclass define-condition", body([Data, Data], each(header()))),
             ("with-recovery-procedures", body([each(clause())], Form)),
             ("task-net or-parallel try-all pursue try-in-order", sequence(sequence(Form))),

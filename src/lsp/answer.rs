@@ -13,7 +13,7 @@ use lsp_types::{TextEdit, Uri};
 
 use super::project::Project;
 use super::{complete, describe, expand, navigate, outline, recovery, rename, repair, semantic};
-use crate::format::{format, styles_of};
+use crate::format::{format_edits, indent_edits, styles_of};
 
 /// Answers a request.
 pub(super) fn answer(project: &Project, request: Request) -> Response {
@@ -95,22 +95,13 @@ fn refuse(id: lsp_server::RequestId, error: &serde_json::Error) -> Response {
     Response::new_err(id, ErrorCode::InvalidParams as i32, error.to_string())
 }
 
-/// Returns the edits that format a text, or some of its lines: one for each line that changes.
+/// Returns the edits that format a text, or some of its lines. Of one that cannot be read, the lines are
+/// indented.
 fn formatted(project: &Project, uri: &Uri, lines: Option<(u32, u32)>) -> Option<Vec<TextEdit>> {
     let text = project.text(uri)?;
     let styles = styles_of(&text.tree, &project.module_path(&text.path()));
     let lines = lines.map(|(first, last)| first as usize..=last as usize);
-    let after = format(&text.tree, &styles, lines);
-    let before = text.tree.source();
-    let mut edits = Vec::new();
-    let mut at = 0;
-    let mut new_lines = after.split_inclusive('\n');
-    for line in before.split_inclusive('\n') {
-        let new = new_lines.next().unwrap_or_default();
-        if new != line {
-            edits.push(TextEdit::new(text.range(at..at + line.len()), new.to_owned()));
-        }
-        at += line.len();
-    }
-    Some(edits)
+    let edits = format_edits(&text.tree, &styles, lines.clone())
+        .unwrap_or_else(|_| indent_edits(&text.tree, &styles, lines));
+    Some(edits.into_iter().map(|edit| TextEdit::new(text.range(edit.place), edit.new)).collect())
 }

@@ -38,6 +38,24 @@ fn standard_input_is_formatted_to_standard_output() {
 }
 
 #[test]
+fn blanks_parentheses_and_long_lines_are_put_right() {
+    let call = format!("(list {} 'end)", "'a-name-of-20-columns ".repeat(5));
+    let text = format!("( when   a\n\n\n  (b)\n)\n{call}\n");
+    let names = "'a-name-of-20-columns ".repeat(4);
+    let expected =
+        format!("(when a\n\n  (b))\n(list {}\n      'a-name-of-20-columns 'end)\n", names.trim_end());
+    assert_eq!(format(&["-"], &text), (0, expected.clone(), String::new()));
+    assert_eq!(run(eslc(&["fmt", "-"]).args([] as [&str; 0]), &*text).output, expected, "the short name");
+}
+
+#[test]
+fn a_folder_without_programs_is_an_error() {
+    let folder = Folder::with("format_nothing", &[("notes.txt", "")]);
+    let (status, _, messages) = format(&[&folder.path().display().to_string()], "");
+    assert!(status == 2 && messages.contains("holds no file `*.esl`"), "{messages}");
+}
+
+#[test]
 fn a_text_without_its_ends_is_left_as_it_is() {
     let folder = Folder::with("format_broken", &[("broken.esl", "(when a\nb\n")]);
     let broken = folder.join("broken.esl");
@@ -80,23 +98,4 @@ fn a_new_project_runs_and_its_tests_pass() {
     let readme = std::fs::read_to_string(format!("{project}/README.md")).expect("it was written");
     assert!(readme.starts_with("# rover\n"), "{readme}");
     assert_eq!(run(&mut eslc(&["new", &project]), "").status, Some(2), "it is there already");
-}
-
-#[test]
-fn the_projects_own_files_are_formatted() {
-    // Programs that show what the reader refuses cannot be among them.
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folders = ["stdlib", "world/modules", "examples", "benches", "playground", "src/new/template"];
-    let folders = folders.into_iter().chain(["conformance/soak"]);
-    let programs = std::fs::read_dir(root.join("conformance/programs")).expect("the folder can be listed");
-    let programs = programs.map(|entry| entry.expect("the folder can be listed").path());
-    let programs = programs.filter(|path| path.is_dir() && !path.ends_with("diagnostics"));
-    let folders: Vec<String> = folders
-        .map(|folder| root.join(folder))
-        .chain(programs)
-        .map(|folder| folder.display().to_string())
-        .collect();
-    let arguments: Vec<&str> = std::iter::once("--check").chain(folders.iter().map(|path| &**path)).collect();
-    let (status, output, errors) = format(&arguments, "");
-    assert_eq!(status, 0, "run `eslc format` on these:\n{output}{errors}");
 }
