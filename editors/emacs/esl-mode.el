@@ -21,6 +21,10 @@
   "The compiler, which is the language server too."
   :type 'string)
 
+(defcustom esl-machine "eslvm"
+  "The virtual machine, which runs tests."
+  :type 'string)
+
 (defconst esl-mode--failure-forms
   '("fail" "retry" "abort" "with-recovery-procedures" "with-cleanup-procedure" "define-cause"))
 
@@ -75,10 +79,24 @@ The arguments are those of `common-lisp-indent-function'."
       (view-mode 1)
       (display-buffer (current-buffer)))))
 
+(defun esl-run-test ()
+  "Run the test around point by `eslvm test'."
+  (interactive)
+  (save-buffer)
+  (save-excursion
+    (end-of-line)
+    (beginning-of-defun)
+    (if (looking-at "(deftest\\s-+\\([^ \t\n()]+\\)")
+        (compile (format "%s test %s --filter %s" (shell-quote-argument esl-machine)
+                         (shell-quote-argument (buffer-file-name))
+                         (shell-quote-argument (match-string-no-properties 1))))
+      (user-error "Point is not in a `deftest'"))))
+
 (defvar esl-mode-map
   (let ((map (make-sparse-keymap)))
     (set-keymap-parent map lisp-mode-shared-map)
     (define-key map (kbd "C-c C-e") #'esl-expand)
+    (define-key map (kbd "C-c C-t") #'esl-run-test)
     map)
   "Keys of `esl-mode'.")
 

@@ -17,7 +17,8 @@ function anything(name) {
   });
 }
 
-const settings = { command: "eslc", library: ["."] };
+const settings = { command: "eslc", library: ["."], machine: "eslvm" };
+const typed = [];
 const event = () => ({ dispose() {} });
 const some = (known, name) => new Proxy(known, { get: (at, key) => (key in at ? at[key] : anything(`${name}.${String(key)}`)) });
 const vscode = some(
@@ -42,7 +43,8 @@ const vscode = some(
       "commands",
     ),
     env: some({ language: "en", appName: "test", clipboard: {} }, "env"),
-    window: some({ activeTextEditor: undefined, visibleTextEditors: [], tabGroups: { all: [], onDidChangeTabs: event } }, "window"),
+    Uri: { parse: (text) => ({ fsPath: text.replace("file://", "") }) },
+    window: some({ terminals: [], createTerminal: () => ({ show() {}, sendText: (text) => typed.push(text) }), activeTextEditor: undefined, visibleTextEditors: [], tabGroups: { all: [], onDidChangeTabs: event } }, "window"),
     EventEmitter: class {
       constructor() {
         this.event = event;
@@ -76,9 +78,14 @@ LanguageClient.prototype.stop = async function () {
   assert.deepStrictEqual(client._serverOptions, { command: settings.command, args: ["lsp", "--library", "."] });
   assert.deepStrictEqual(client._clientOptions.documentSelector, [{ language: "esl" }]);
   const { contributes } = require("./package.json");
-  assert.deepStrictEqual(Object.keys(registered), contributes.commands.map(({ command }) => command));
-  assert.strictEqual(context.subscriptions.length, 1);
+  // That of "Run test" has arguments, and is not offered in the palette.
+  const offered = contributes.commands.map(({ command }) => command);
+  assert.deepStrictEqual(Object.keys(registered), [...offered, "esl.runTest"]);
+  assert.strictEqual(context.subscriptions.length, 2);
   await registered["esl.showExpansion"]();
+  registered["esl.runTest"]("file:///robot/test.esl", "it-docks");
+  const quote = process.platform === "win32" ? '"' : "'";
+  assert.deepStrictEqual(typed, [`eslvm test ${quote}/robot/test.esl${quote} --filter ${quote}it-docks${quote}`]);
   await extension.deactivate();
   assert(isStopped, "the client is stopped");
   console.log("all is well");

@@ -121,8 +121,8 @@ enum EslcAction {
     },
     /// Format files as Lisp programmers expect
     ///
-    /// Blanks, indentation, lone parentheses and blank lines are put right, and lines of more than 100 columns
-    /// are broken; other lines keep their breaks. Comments, strings and all that is read stay the same. What
+    /// Blanks, indentation, lone parentheses and blank lines are put right, and lines of more than 100
+    /// columns are broken; other lines keep their breaks. Comments, strings and all that is read stay the same. What
     /// stands under what follows from the operators: library macros and those that the file and its modules
     /// define are indented by the `&body` of their lambda lists, or as `(declare (indent N))` says in them.
     #[command(visible_alias = "fmt")]

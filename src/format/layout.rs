@@ -306,8 +306,8 @@ impl Layout<'_> {
         }
     }
 
-    /// Looks whether a piece that was just placed is beyond the width, and whether that can be helped. Returns
-    /// the first piece that begins a line instead.
+    /// Looks whether a piece that was just placed is beyond the width, and whether its line can be broken.
+    /// Returns the first piece that begins a line instead.
     fn break_before(&mut self, at: usize) -> Option<usize> {
         let piece = self.pieces[at];
         let PlacedPiece { start, end, lead } = self.placed[at];

@@ -2,18 +2,18 @@
 
 use std::fmt::Display;
 
+use super::project::Project;
+use super::{
+    complete, describe, expand, layout, links, navigate, outline, recovery, rename, repair, semantic,
+};
 use lsp_server::{ErrorCode, Request, Response};
 use lsp_types::request::{
-    CodeActionRequest, Completion, DocumentHighlightRequest, DocumentSymbolRequest, ExecuteCommand,
-    FoldingRangeRequest, Formatting, GotoDefinition, HoverRequest, InlayHintRequest, PrepareRenameRequest,
-    RangeFormatting, References, Rename, Request as RequestKind, SelectionRangeRequest,
-    SemanticTokensFullRequest, SemanticTokensRangeRequest, SignatureHelpRequest, WorkspaceSymbolRequest,
+    CodeActionRequest, CodeLensRequest, Completion, DocumentHighlightRequest, DocumentLinkRequest,
+    DocumentSymbolRequest, ExecuteCommand, FoldingRangeRequest, Formatting, GotoDefinition, HoverRequest,
+    InlayHintRequest, OnTypeFormatting, PrepareRenameRequest, RangeFormatting, References, Rename,
+    Request as RequestKind, SelectionRangeRequest, SemanticTokensFullRequest, SemanticTokensRangeRequest,
+    SignatureHelpRequest, WorkspaceSymbolRequest,
 };
-use lsp_types::{TextEdit, Uri};
-
-use super::project::Project;
-use super::{complete, describe, expand, navigate, outline, recovery, rename, repair, semantic};
-use crate::format::{format_edits, indent_edits, styles_of};
 
 /// Answers a request.
 pub(super) fn answer(project: &Project, request: Request) -> Response {
@@ -50,14 +50,11 @@ pub(super) fn answer(project: &Project, request: Request) -> Response {
         }
         InlayHintRequest::METHOD => reply::<InlayHintRequest>(request, |p| recovery::hints(project, &p)),
         CodeActionRequest::METHOD => reply::<CodeActionRequest>(request, |p| repair::actions(project, &p)),
-        Formatting::METHOD => {
-            reply::<Formatting>(request, |p| formatted(project, &p.text_document.uri, None))
-        }
-        RangeFormatting::METHOD => reply::<RangeFormatting>(request, |p| {
-            let last = p.range.end.line
-                - u32::from(p.range.end.character == 0 && p.range.end.line > p.range.start.line);
-            formatted(project, &p.text_document.uri, Some((p.range.start.line, last)))
-        }),
+        Formatting::METHOD => reply::<Formatting>(request, |p| layout::whole(project, &p)),
+        RangeFormatting::METHOD => reply::<RangeFormatting>(request, |p| layout::range(project, &p)),
+        OnTypeFormatting::METHOD => reply::<OnTypeFormatting>(request, |p| layout::typed(project, &p)),
+        DocumentLinkRequest::METHOD => reply::<DocumentLinkRequest>(request, |p| links::links(project, &p)),
+        CodeLensRequest::METHOD => reply::<CodeLensRequest>(request, |p| links::lenses(project, &p)),
         ExecuteCommand::METHOD => try_reply::<ExecuteCommand, _>(request, |p| {
             expand::execute(project, &p).map(|text| Some(text.into()))
         }),
@@ -93,15 +90,4 @@ fn reply<R: RequestKind>(request: Request, answer: impl FnOnce(R::Params) -> R::
 
 fn refuse(id: lsp_server::RequestId, error: &serde_json::Error) -> Response {
     Response::new_err(id, ErrorCode::InvalidParams as i32, error.to_string())
-}
-
-/// Returns the edits that format a text, or some of its lines. Of one that cannot be read, the lines are
-/// indented.
-fn formatted(project: &Project, uri: &Uri, lines: Option<(u32, u32)>) -> Option<Vec<TextEdit>> {
-    let text = project.text(uri)?;
-    let styles = styles_of(&text.tree, &project.module_path(&text.path()));
-    let lines = lines.map(|(first, last)| first as usize..=last as usize);
-    let edits = format_edits(&text.tree, &styles, lines.clone())
-        .unwrap_or_else(|_| indent_edits(&text.tree, &styles, lines));
-    Some(edits.into_iter().map(|edit| TextEdit::new(text.range(edit.place), edit.new)).collect())
 }

@@ -128,6 +128,19 @@ fn add(tree: &SyntaxTree, form: NodeId, operator: &str, package: &str, found: &m
         lambda_list: lambda_list.map(|list| tree.text(list).to_owned()),
         text: text.map(|text| string(tree.text(text))).unwrap_or_default(),
     });
+    if operator == "define-condition" {
+        // Failures by the condition have this cause.
+        let told = found.last().map(|condition| condition.text.clone()).unwrap_or_default();
+        found.push(NameDefinition {
+            name: format!(":{name}"),
+            package: package.to_owned(),
+            kind: DefinedAs::Cause,
+            name_place: tree.range(name_node),
+            place: tree.range(form),
+            lambda_list: None,
+            text: told,
+        });
+    }
     match operator {
         "defstruct" => add_structure(tree, form, &name, package, found),
         "defclass" | "define-condition" => add_accessors(tree, form, package, found),

@@ -24,13 +24,16 @@ pub(super) struct OpenText {
     pub(super) version: i32,
     pub(super) tree: SyntaxTree,
     pub(super) lines: LineStarts,
+    /// For each character of several bytes its offset, and how many more bytes the text has up to it, itself
+    /// included, than units of UTF-16.
+    wide: Vec<(u32, u32)>,
     unit: ColumnUnit,
 }
 
 impl OpenText {
     pub(super) fn new(uri: Uri, version: i32, text: String, unit: ColumnUnit) -> OpenText {
-        let lines = LineStarts::new(&text);
-        OpenText { uri, version, tree: SyntaxTree::new(text), lines, unit }
+        let (lines, wide) = (LineStarts::new(&text), wide_characters(&text));
+        OpenText { uri, version, tree: SyntaxTree::new(text), lines, wide, unit }
     }
 
     /// Takes changes of the text, each of which is based on the one before.
@@ -49,6 +52,7 @@ impl OpenText {
         }
         self.version = version;
         self.lines = LineStarts::new(&text);
+        self.wide = wide_characters(&text);
         self.tree = SyntaxTree::new(text);
     }
 
@@ -81,15 +85,20 @@ impl OpenText {
 
     /// Returns the position of a byte.
     pub(super) fn position(&self, offset: usize) -> Position {
-        let text = self.tree.source();
-        let offset = text.floor_char_boundary(offset);
+        let offset = self.tree.source().floor_char_boundary(offset);
         let line = self.lines.line_of(offset);
-        let before = &text[self.lines.range(line).start..offset];
+        let start = self.lines.range(line).start;
         let column = match self.unit {
-            ColumnUnit::Bytes => before.len(),
-            ColumnUnit::Utf16 => before.encode_utf16().count(),
+            ColumnUnit::Bytes => offset - start,
+            ColumnUnit::Utf16 => offset - start - (self.surplus(offset) - self.surplus(start)),
         };
         Position::new(line as u32, column as u32)
+    }
+
+    /// Returns how many more bytes than units of UTF-16 the text has up to an offset.
+    fn surplus(&self, offset: usize) -> usize {
+        let before = self.wide.partition_point(|&(at, _)| (at as usize) < offset);
+        before.checked_sub(1).map_or(0, |last| self.wide[last].1 as usize)
     }
 
     /// Returns the number of columns of a part of a line.
@@ -109,6 +118,15 @@ impl OpenText {
     pub(super) fn location(&self, range: Range<usize>) -> Location {
         Location::new(self.uri.clone(), self.range(range))
     }
+}
+
+fn wide_characters(text: &str) -> Vec<(u32, u32)> {
+    let wide = text.char_indices().filter(|(_, c)| !c.is_ascii());
+    let counted = wide.scan(0, |surplus, (at, c)| {
+        *surplus += (c.len_utf8() - c.len_utf16()) as u32;
+        Some((at as u32, *surplus))
+    });
+    counted.collect()
 }
 
 /// Returns the path that a `file` URI names; for another one its text, which no file has.

@@ -2,8 +2,8 @@
 //!
 //! Guarantees: a request is answered from the texts as the editor has them; what is asked of a name works on
 //! the lossless tree, so also in a file that does not compile. Diagnostics are those of the compiler, found
-//! on a thread of its own once the typing pauses. Not here: the protocol (`lsp-server`, `lsp-types`),
-//! formatting ([`crate::format`]).
+//! on a thread of its own once the typing pauses. Not here: the messages of the protocol (`lsp-server`,
+//! `lsp-types`), formatting ([`crate::format`]).
 //!
 //! ```
 //! // Standard input ends at once here: no client has said hello, which is an error.
@@ -17,7 +17,10 @@ mod definition;
 mod describe;
 mod document;
 mod expand;
+mod family;
+mod layout;
 mod library;
+mod links;
 mod navigate;
 mod outline;
 mod project;
@@ -27,57 +30,42 @@ mod rename;
 mod repair;
 mod scope;
 mod semantic;
+mod wire;
 
+use std::io::{self, BufRead};
 use std::path::PathBuf;
-use std::{fmt, io};
+use std::sync::mpsc;
 
-use lsp_server::{Connection, ErrorCode, Message, Notification, ProtocolError, Response};
+use lsp_server::{ErrorCode, Message, Notification, Request, Response};
 use lsp_types::notification::{
     DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument, Exit,
     Notification as NotificationKind,
 };
-use lsp_types::request::{Request as _, Shutdown};
+use lsp_types::request::{Initialize, Request as _, Shutdown};
 use lsp_types::{
-    CodeActionProviderCapability, CompletionOptions, ExecuteCommandOptions, FoldingRangeProviderCapability,
+    CodeActionProviderCapability, CodeLensOptions, CompletionOptions, DocumentLinkOptions,
+    DocumentOnTypeFormattingOptions, ExecuteCommandOptions, FoldingRangeProviderCapability,
     HoverProviderCapability, InitializeParams, OneOf, PositionEncodingKind, RenameOptions,
     SelectionRangeProviderCapability, SemanticTokensFullOptions, SemanticTokensOptions, ServerCapabilities,
     SignatureHelpOptions, TextDocumentSyncCapability, TextDocumentSyncKind,
 };
+use serde_json::Value;
 
 use crate::command::{FAILED, SUCCESS, USAGE, complain};
 use check::Checker;
 use document::{ColumnUnit, path_of};
 use project::Project;
-
-/// What ended the service of a client before it said goodbye.
-#[derive(Debug)]
-enum LspError {
-    /// The client breaks the protocol, or the connection ends.
-    Protocol(ProtocolError),
-    /// The client says hello wrongly.
-    Hello(serde_json::Error),
-    /// Standard output cannot be written, or standard input not be read.
-    Streams(io::Error),
-}
-
-impl fmt::Display for LspError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            LspError::Protocol(error) => error.fmt(f),
-            LspError::Hello(error) => write!(f, "the client says hello wrongly: {error}"),
-            LspError::Streams(error) => error.fmt(f),
-        }
-    }
-}
+use wire::{read_frame, sent, start_writer};
 
 /// Serves one client until it says goodbye. Returns the exit status: 0 if the client has asked for the end
 /// before, 1 if it has not, 2 if it has not said hello.
 pub fn serve(folders: Vec<PathBuf>) -> u8 {
-    let (connection, threads) = Connection::stdio();
-    let result = session(&connection, folders);
+    let (sender, writer) = start_writer();
+    let served = session(&mut io::stdin().lock(), &sender, folders);
     // The writing thread ends when nobody can send any more.
-    drop(connection);
-    match result.and_then(|status| threads.join().map(|()| status).map_err(LspError::Streams)) {
+    drop(sender);
+    let written = writer.join().unwrap_or(Ok(()));
+    match served.and_then(|status| written.map(|()| status)) {
         Ok(status) => status,
         Err(error) => {
             complain(error);
@@ -86,46 +74,89 @@ pub fn serve(folders: Vec<PathBuf>) -> u8 {
     }
 }
 
-fn session(connection: &Connection, folders: Vec<PathBuf>) -> Result<u8, LspError> {
-    let (id, parameters) = connection.initialize_start().map_err(LspError::Protocol)?;
-    let parameters: InitializeParams = serde_json::from_value(parameters).map_err(LspError::Hello)?;
-    let unit = unit_of(&parameters);
-    let result = serde_json::json!({
-        "capabilities": capabilities(unit),
-        "serverInfo": { "name": "eslc", "version": env!("CARGO_PKG_VERSION") },
-    });
-    connection.initialize_finish(id, result).map_err(LspError::Protocol)?;
-    let roots = parameters.workspace_folders.unwrap_or_default();
-    let roots = roots.iter().map(|folder| path_of(&folder.uri)).collect();
-    let mut project = Project::new(folders, roots, unit);
-    let sender = connection.sender.clone();
-    let checker = Checker::start(move |message| sender.send(message).is_ok());
-    // What an end without a goodbye means: the client may have been killed.
-    let mut status = FAILED;
-    for message in &connection.receiver {
-        match message {
-            Message::Request(request) => {
-                let response = match &*request.method {
-                    _ if status == SUCCESS => {
-                        let message = "the server has been asked to shut down".into();
-                        Response::new_err(request.id, ErrorCode::InvalidRequest as i32, message)
-                    }
-                    Shutdown::METHOD => {
-                        status = SUCCESS;
-                        Response::new_ok(request.id, ())
-                    }
-                    _ => answer::answer(&project, request),
-                };
-                if connection.sender.send(Message::Response(response)).is_err() {
-                    break;
-                }
+/// What of a session has passed.
+struct ServedClient {
+    /// The texts, once the client has said hello.
+    greeted: Option<(Project, Checker)>,
+    folders: Vec<PathBuf>,
+    is_shut_down: bool,
+}
+
+fn session(input: &mut impl BufRead, sender: &mpsc::Sender<Value>, folders: Vec<PathBuf>) -> io::Result<u8> {
+    let mut session = ServedClient { greeted: None, folders, is_shut_down: false };
+    while let Some(frame) = read_frame(input)? {
+        let answer = match frame {
+            Ok(Message::Request(request)) => sent(Message::Response(session.answer(request, sender))),
+            Ok(Message::Notification(notification)) if notification.method == Exit::METHOD => {
+                return Ok(if session.is_shut_down { SUCCESS } else { FAILED });
             }
-            Message::Notification(notification) if notification.method == Exit::METHOD => break,
-            Message::Notification(notification) => take(&mut project, &checker, notification),
-            Message::Response(_) => {}
+            Ok(Message::Notification(notification)) => {
+                if let Some((project, checker)) = &mut session.greeted {
+                    take(project, checker, notification);
+                }
+                continue;
+            }
+            Ok(Message::Response(_)) => continue,
+            Err(fault) => fault.answer(),
+        };
+        if sender.send(answer).is_err() {
+            break;
         }
     }
-    Ok(status)
+    // What an end without a goodbye means: the client may have been killed.
+    Ok(match session {
+        ServedClient { greeted: None, .. } => {
+            complain("the input ended before an `initialize` request");
+            USAGE
+        }
+        ServedClient { is_shut_down: true, .. } => SUCCESS,
+        ServedClient { is_shut_down: false, .. } => FAILED,
+    })
+}
+
+impl ServedClient {
+    fn answer(&mut self, request: Request, sender: &mpsc::Sender<Value>) -> Response {
+        let refuse = |id, code: ErrorCode, message: &str| Response::new_err(id, code as i32, message.into());
+        match (&*request.method, &self.greeted) {
+            _ if self.is_shut_down => {
+                refuse(request.id, ErrorCode::InvalidRequest, "the server has been asked to shut down")
+            }
+            (Initialize::METHOD, None) => self.greet(request, sender),
+            (Initialize::METHOD, Some(_)) => {
+                refuse(request.id, ErrorCode::InvalidRequest, "the session is initialized already")
+            }
+            (_, None) => {
+                let message = "the first request of a session is `initialize`";
+                refuse(request.id, ErrorCode::ServerNotInitialized, message)
+            }
+            (Shutdown::METHOD, Some(_)) => {
+                self.is_shut_down = true;
+                Response::new_ok(request.id, ())
+            }
+            (_, Some((project, _))) => answer::answer(project, request),
+        }
+    }
+
+    fn greet(&mut self, request: Request, sender: &mpsc::Sender<Value>) -> Response {
+        let parameters: InitializeParams = match serde_json::from_value(request.params) {
+            Ok(parameters) => parameters,
+            Err(error) => {
+                let message = format!("invalid `initialize` request: {error}");
+                return Response::new_err(request.id, ErrorCode::InvalidParams as i32, message);
+            }
+        };
+        let unit = unit_of(&parameters);
+        let roots = parameters.workspace_folders.unwrap_or_default();
+        let roots = roots.iter().map(|folder| path_of(&folder.uri)).collect();
+        let sender = sender.clone();
+        let checker = Checker::start(move |message| sender.send(sent(message)).is_ok());
+        self.greeted = Some((Project::new(self.folders.clone(), roots, unit), checker));
+        let result = serde_json::json!({
+            "capabilities": capabilities(unit),
+            "serverInfo": { "name": "eslc", "version": env!("CARGO_PKG_VERSION") },
+        });
+        Response::new_ok(request.id, result)
+    }
 }
 
 /// Takes a change of a text in the editor. A notification that cannot be understood is left aside, as the
@@ -205,6 +236,15 @@ fn capabilities(unit: ColumnUnit) -> ServerCapabilities {
         code_action_provider: Some(CodeActionProviderCapability::Simple(true)),
         document_formatting_provider: Some(OneOf::Left(true)),
         document_range_formatting_provider: Some(OneOf::Left(true)),
+        document_on_type_formatting_provider: Some(DocumentOnTypeFormattingOptions {
+            first_trigger_character: "\n".into(),
+            more_trigger_character: None,
+        }),
+        document_link_provider: Some(DocumentLinkOptions {
+            resolve_provider: Some(false),
+            work_done_progress_options: Default::default(),
+        }),
+        code_lens_provider: Some(CodeLensOptions { resolve_provider: Some(false) }),
         rename_provider: Some(OneOf::Right(RenameOptions {
             prepare_provider: Some(true),
             work_done_progress_options: Default::default(),

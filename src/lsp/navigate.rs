@@ -7,6 +7,7 @@ use lsp_types::{
 };
 
 use super::document::OpenText;
+use super::links;
 use super::project::Project;
 use super::scope::{LocalBinding, binding_of};
 use crate::syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
@@ -31,7 +32,11 @@ pub(super) fn definition(
     project: &Project,
     parameters: &GotoDefinitionParams,
 ) -> Option<GotoDefinitionResponse> {
-    let found = name_at(project, &parameters.text_document_position_params)?;
+    let at = &parameters.text_document_position_params;
+    if let Some(module) = links::module_at(project, at) {
+        return Some(GotoDefinitionResponse::Scalar(module));
+    }
+    let found = name_at(project, at)?;
     if let Some(binding) = found.binding {
         let place = found.text.location(found.text.tree.range(binding.name));
         return Some(GotoDefinitionResponse::Scalar(place));
@@ -43,8 +48,13 @@ pub(super) fn definition(
 
 /// Returns the uses of a name in one text, definitions included.
 pub(super) fn uses_in(text: &OpenText, found: &NameAt<'_>) -> Vec<NodeId> {
+    uses_of(text, &found.name, found.binding)
+}
+
+/// As [`uses_in`], of a name and its binding if it is local.
+pub(super) fn uses_of(text: &OpenText, wanted: &str, bound: Option<LocalBinding>) -> Vec<NodeId> {
     let tree = &text.tree;
-    let nodes = match found.binding {
+    let nodes = match bound {
         Some(binding) => {
             let scope = tree.range(binding.scope);
             tree.first_at(scope.start)..tree.first_at(scope.end)
@@ -52,11 +62,11 @@ pub(super) fn uses_in(text: &OpenText, found: &NameAt<'_>) -> Vec<NodeId> {
         None => tree.nodes(),
     };
     let is_same = |&node: &NodeId| {
-        if found.binding.is_none() && is_designator(tree, node, &found.name) {
+        if bound.is_none() && is_designator(tree, node, wanted) {
             return true;
         }
-        tree.name(node).is_some_and(|name| bare_name(name) == found.name)
-            && binding_of(tree, node).map(|binding| binding.name) == found.binding.map(|binding| binding.name)
+        tree.name(node).is_some_and(|name| bare_name(name) == wanted)
+            && binding_of(tree, node).map(|binding| binding.name) == bound.map(|binding| binding.name)
     };
     nodes.filter(is_same).collect()
 }

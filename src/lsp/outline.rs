@@ -14,6 +14,11 @@ use crate::syntax::SyntaxKind;
 /// Symbols of a workspace that are answered at once.
 const MAX_SYMBOLS: usize = 1000;
 
+/// Places that are offered to be selected around a position: so many of the innermost ones, and of the
+/// outermost ones.
+const INNERMOST: usize = 48;
+const OUTERMOST: usize = 16;
+
 fn symbol_kind(kind: DefinedAs) -> SymbolKind {
     match kind {
         DefinedAs::Function | DefinedAs::Macro | DefinedAs::Operator => SymbolKind::FUNCTION,
@@ -36,7 +41,13 @@ pub(super) fn symbols(
     let text = project.text(&parameters.text_document.uri)?;
     let mut symbols: Vec<DocumentSymbol> = Vec::new();
     let mut places: Vec<std::ops::Range<usize>> = Vec::new();
+    let mut last_name = 0..0;
     for definition in definitions(&text.tree) {
+        // The cause of a condition has no name of its own.
+        if definition.kind == DefinedAs::Cause && definition.name_place == last_name {
+            continue;
+        }
+        last_name = definition.name_place.clone();
         #[allow(deprecated, reason = "the field has to be there")]
         let symbol = DocumentSymbol {
             name: definition.name.clone(),
@@ -159,6 +170,10 @@ pub(super) fn selections(
             at = tree.parent(node);
         }
         places.dedup();
+        // The answer nests as deep as there are places, and clients read it by recursion.
+        if places.len() > INNERMOST + OUTERMOST {
+            places.drain(INNERMOST..places.len() - OUTERMOST);
+        }
         let outwards = |parent: Option<Box<SelectionRange>>, place: std::ops::Range<usize>| {
             Some(Box::new(SelectionRange { range: text.range(place), parent }))
         };

@@ -4,7 +4,9 @@
 //! raises in the body of its form, or in functions of the file that are called from there, unless a clause
 //! further in handles them.
 
+use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
 
 use esl_compiler::reader::lexer::Token;
 use lsp_types::{InlayHint, InlayHintLabel, InlayHintParams};
@@ -14,6 +16,8 @@ use crate::syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
 
 /// Failures of which a hint names the lines.
 const MAX_LINES: usize = 5;
+/// Steps of the search for failures in one text.
+const MAX_STEPS: usize = 1_000_000;
 
 /// Answers the hints of a part of a text.
 pub(super) fn hints(project: &Project, parameters: &InlayHintParams) -> Option<Vec<InlayHint>> {
@@ -57,11 +61,30 @@ struct FailureMap<'a> {
     functions: HashMap<String, NodeId>,
     /// Parents of causes.
     parents: HashMap<String, Vec<String>>,
+    /// Steps that are left.
+    steps: Cell<usize>,
+}
+
+/// The clauses around a form, in forms that nest.
+struct AroundClauses {
+    clauses: Vec<NodeId>,
+    outer: Option<Rc<AroundClauses>>,
+}
+
+impl Drop for AroundClauses {
+    /// Drops what only this one knows without recursion.
+    fn drop(&mut self) {
+        let mut next = self.outer.take();
+        while let Some(mut outer) = next.and_then(|outer| Rc::try_unwrap(outer).ok()) {
+            next = outer.outer.take();
+        }
+    }
 }
 
 /// Returns the clauses that handle failures, each with the forms that fail.
 fn handled(tree: &SyntaxTree) -> HashMap<NodeId, Vec<NodeId>> {
-    let mut map = FailureMap { tree, functions: HashMap::new(), parents: HashMap::new() };
+    let mut map =
+        FailureMap { tree, functions: HashMap::new(), parents: HashMap::new(), steps: Cell::new(MAX_STEPS) };
     for form in tree.nodes() {
         let Some(operator) = tree.operator(form) else { continue };
         let data: Vec<NodeId> = tree.data(form).take(3).collect();
@@ -103,8 +126,10 @@ impl FailureMap<'_> {
     fn failures(&self, form: NodeId, seen: &mut HashSet<String>) -> Vec<NodeId> {
         let mut found = Vec::new();
         // The forms to be looked at, with the clauses around each.
-        let mut waiting: Vec<(NodeId, Vec<NodeId>)> = vec![(form, Vec::new())];
+        let mut waiting: Vec<(NodeId, Option<Rc<AroundClauses>>)> = vec![(form, None)];
         while let Some((node, clauses)) = waiting.pop() {
+            let Some(left) = self.steps.get().checked_sub(1) else { return found };
+            self.steps.set(left);
             let is_code = !matches!(self.tree.kind(node), SyntaxKind::Mark(Token::Quote));
             if !is_code {
                 continue;
@@ -113,13 +138,17 @@ impl FailureMap<'_> {
             match operator.as_deref() {
                 Some("fail") => {
                     let cause = self.cause_of(node).unwrap_or_default();
-                    if !clauses.iter().any(|&clause| self.handles(clause, &cause)) {
+                    let around = std::iter::successors(clauses.as_deref(), |around| around.outer.as_deref());
+                    let mut all = around.flat_map(|around| &around.clauses).inspect(|_| {
+                        self.steps.set(self.steps.get().saturating_sub(1));
+                    });
+                    if !all.any(|&clause| self.handles(clause, &cause)) {
                         found.push(node);
                     }
                 }
                 Some("with-recovery-procedures") => {
                     let inner = self.tree.data(node).nth(1).into_iter().flat_map(|list| self.tree.data(list));
-                    let all: Vec<NodeId> = clauses.iter().copied().chain(inner).collect();
+                    let all = Some(Rc::new(AroundClauses { clauses: inner.collect(), outer: clauses }));
                     waiting.extend(self.tree.data(node).skip(2).map(|part| (part, all.clone())));
                     continue;
                 }

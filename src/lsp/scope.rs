@@ -28,6 +28,25 @@ const NOT_BINDING: &[&str] = &[
     "with-world",
 ];
 
+/// Operators of the language that define something without a lambda list behind its name.
+const DEFINING_NO_FUNCTION: &[&str] = &[
+    "defclass",
+    "defconstant",
+    "define-cause",
+    "define-condition",
+    "define-fluent",
+    "define-hash-table-test",
+    "define-input",
+    "define-resource",
+    "define-rule",
+    "define-symbol-macro",
+    "defpackage",
+    "defparameter",
+    "defstruct",
+    "deftest",
+    "defvar",
+];
+
 /// What a local name is a name of: each sort has names of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LocalSort {
@@ -136,13 +155,18 @@ fn is_description(tree: &SyntaxTree, list: NodeId) -> bool {
     let place = |inner: NodeId| {
         let outer = tree.parent(inner)?;
         let operator = tree.operator(outer).filter(|operator| operator.starts_with("def"))?;
-        let at = tree.data(outer).position(|part| part == inner)?;
-        let qualifiers = tree.data(outer).filter(|&part| part < inner && is_qualifier(tree, part)).count();
+        // Further back nothing is described, but in slots, which are many.
+        let at = tree.data(outer).take(6).position(|part| part == inner).unwrap_or(6);
+        let qualifiers =
+            tree.data(outer).take(6).filter(|&part| part < inner && is_qualifier(tree, part)).count();
         Some((operator, at - qualifiers))
     };
     let has_slots = |operator: &str| matches!(operator, "defstruct" | "defclass" | "define-condition");
     let has_value = |operator: &str| {
-        matches!(operator, "defvar" | "defparameter" | "defconstant" | "deftest" | "define-fluent")
+        matches!(
+            operator,
+            "defvar" | "defparameter" | "defconstant" | "deftest" | "define-fluent" | "define-rule"
+        )
     };
     match place(list) {
         Some((operator, at)) if has_slots(&operator) => at >= 1,
@@ -163,7 +187,12 @@ pub(super) fn is_qualifier(tree: &SyntaxTree, node: NodeId) -> bool {
     };
     let operator = tree.data(method).next().and_then(|first| tree.name(first)?.rsplit(':').next());
     operator.is_some_and(|operator| operator.eq_ignore_ascii_case("defmethod"))
-        && tree.data(method).skip(2).take_while(|&part| tree.name(part).is_some()).any(|part| part == node)
+        && tree
+            .data(method)
+            .skip(2)
+            .take(4)
+            .take_while(|&part| tree.name(part).is_some())
+            .any(|part| part == node)
 }
 
 /// Whether a list is a clause of a `cond` or `case`, or a binding of a `let`: no call.
@@ -199,7 +228,7 @@ fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
         "multiple-value-bind" | "destructuring-bind" => {
             argument(1).into_iter().for_each(|list| parameters(tree, list, &mut variable));
         }
-        "%named-lambda" | "define-fluent" => {
+        "%named-lambda" => {
             argument(2).into_iter().for_each(|list| parameters(tree, list, &mut variable));
         }
         "defmethod" => {
@@ -221,6 +250,7 @@ fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
             let clauses = tree.data(list).skip(1).filter(|&clause| tree.kind(clause) == SyntaxKind::List);
             clauses.filter_map(|clause| head_name(tree, clause)).for_each(variable);
         }
+        name if DEFINING_NO_FUNCTION.contains(&name) => {}
         name if name.starts_with("def") => {
             if let Some(list) = argument(2).filter(|&list| tree.kind(list) == SyntaxKind::List) {
                 parameters(tree, list, &mut variable);
@@ -229,13 +259,15 @@ fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
         // These take something else there: seconds, clauses, the name of a resource.
         name if NOT_BINDING.contains(&name) => bound_by_clause(tree, list, found),
         name if name.starts_with("do") || name.starts_with("with-") => {
-            if let Some(header) = argument(1).filter(|&header| tree.kind(header) == SyntaxKind::List) {
-                tree.data(header)
-                    .next()
-                    .filter(|&name| tree.name(name).is_some())
-                    .into_iter()
-                    .for_each(variable);
-            }
+            let first = argument(1).filter(|&header| tree.kind(header) == SyntaxKind::List);
+            let first = first.and_then(|header| tree.data(header).next());
+            // A server's header begins with a port, or with a list for the connection.
+            let name = match (name, first) {
+                ("with-server", Some(first)) if tree.kind(first) != SyntaxKind::List => None,
+                ("with-server", Some(first)) => tree.data(first).next(),
+                _ => first,
+            };
+            name.filter(|&name| tree.name(name).is_some()).into_iter().for_each(variable);
         }
         _ => bound_by_clause(tree, list, found),
     }

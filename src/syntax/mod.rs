@@ -124,6 +124,13 @@ impl SyntaxTree {
         1..self.nodes.len() as NodeId
     }
 
+    /// Returns all nodes inside a node, each before those that it contains.
+    pub fn nodes_in(&self, node: NodeId) -> Range<NodeId> {
+        let end = self.range(node).end;
+        let first = self.first_at(self.range(node).start + 1).max(node + 1);
+        first..self.first_at(end).max(first)
+    }
+
     /// Returns whether a node is a comment.
     pub fn is_comment(&self, node: NodeId) -> bool {
         matches!(self.kind(node), SyntaxKind::Comment | SyntaxKind::BlockComment)

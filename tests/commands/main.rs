@@ -14,6 +14,7 @@ mod editors;
 mod examples;
 mod exploring;
 mod folder;
+mod frames;
 mod grammar;
 mod http;
 #[cfg(unix)]
@@ -37,6 +38,7 @@ mod playground;
 mod profile;
 mod real_time;
 mod recording;
+mod renaming;
 mod replay;
 mod rights;
 #[cfg(unix)]
@@ -51,6 +53,7 @@ mod terminal;
 mod testing;
 mod timeline;
 mod traces;
+mod typing;
 #[cfg(unix)]
 mod ways_out;
 mod world;

@@ -26,6 +26,14 @@ let b:undo_ftplugin = "setlocal lisp< expandtab< shiftwidth< softtabstop< iskeyw
 " Neovim has a client of its own.
 if has("nvim-0.7") && executable("eslc")
 lua << END
+  -- "Run test" above a test: in a terminal below.
+  if vim.lsp.commands then
+    vim.lsp.commands["esl.runTest"] = function(command)
+      local file, test = vim.uri_to_fname(command.arguments[1]), command.arguments[2]
+      vim.cmd("botright new")
+      vim.fn.termopen({ "eslvm", "test", file, "--filter", test })
+    end
+  end
   local server = { name = "eslc", cmd = { "eslc", "lsp" }, root_dir = vim.fn.expand("%:p:h") }
   if vim.lsp.start then
     vim.lsp.start(server)
