@@ -153,7 +153,7 @@ impl Shapes<'_> {
                 let mut ready = tree.data(list).skip(2).filter(is_ready);
                 if **rest != Indentation::Form || tree.operator(list).as_deref() == Some("if") {
                     BreakMode::Each
-                } else if is_broken() {
+                } else if is_broken() || tree.data(list).next().is_some_and(|first| self.is_keyword(first)) {
                     BreakMode::Fill
                 } else if tree.data(list).skip(2).any(|node| self.is_keyword(node)) {
                     BreakMode::Keywords
@@ -174,13 +174,17 @@ impl Shapes<'_> {
         }
     }
 
-    /// Whether the elements of a list are names, numbers and the like: such a list is filled anew where it is
-    /// broken.
+    /// Whether a list is filled anew where it is broken: names, numbers and short lists, without comments. A
+    /// list of lists only has the lines that its author gave it, and so have keywords and their values.
     pub(super) fn is_plain(&self, list: NodeId) -> bool {
         let tree = self.tree;
-        let is_plain = |node: NodeId| matches!(tree.kind(node), SyntaxKind::Leaf(_));
-        let is_parameters = *self.shape(list) == Indentation::Parameters;
-        tree.children(list).all(|node| is_plain(node) || is_parameters && !tree.is_comment(node))
+        let is_leaf = |node: NodeId| matches!(tree.kind(node), SyntaxKind::Leaf(_));
+        let is_call = matches!(self.shape(list), Indentation::Call(_));
+        let is_short = |node: NodeId| {
+            !tree.is_comment(node) && !tree.text(node).contains('\n') && !(is_call && self.is_keyword(node))
+        };
+        let has_leaves = || tree.data(list).skip(1 + usize::from(is_call)).any(is_leaf);
+        tree.children(list).all(is_short) && has_leaves()
     }
 
     /// Whether a node is the first on its line in the text.
