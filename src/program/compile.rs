@@ -9,6 +9,7 @@ use esl_compiler::session::{Compiler, Texts};
 use esl_vm::host::{Host, Inbox, ProcessSignal, RealHost, Rights};
 use esl_vm::vm::{Config, Vm};
 
+use super::run::only_compile;
 use super::{Ended, Program, Source, machine, set_module_path};
 use crate::error::Error;
 use crate::module_path::ModulePath;
@@ -167,6 +168,7 @@ fn compile_time_machine(path: &ModulePath, config: Config) -> Result<Vm, Error> 
     let host = RealHost::new(Vec::new()).with_rights(path.with_rights(Rights::none()));
     let mut machine = machine(config, Box::new(host))?;
     set_module_path(&mut machine, path)?;
+    only_compile(&mut machine)?;
     Ok(machine)
 }
 

@@ -119,6 +119,14 @@ pub(crate) fn set_module_folders(machine: &mut Vm, folders: &[String]) -> Result
     call_with_list(machine, "%SET-MODULE-PATH", folders)
 }
 
+/// Notes that a machine only compiles a program, so that messages about rights name no option of a run.
+///
+/// # Errors
+/// [`Error::NoMemory`].
+pub(super) fn only_compile(machine: &mut Vm) -> Result<(), Error> {
+    call_with_list(machine, "%ONLY-COMPILE", std::iter::empty())
+}
+
 /// Calls a function of the library with a list of `items`.
 fn call_with_list(machine: &mut Vm, function: &str, items: impl Iterator<Item = Datum>) -> Result<(), Error> {
     let list = Datum::list(items.collect::<Vec<_>>(), Span::default());
