@@ -12,6 +12,7 @@ use crate::datum::{Datum, ObjectId};
 use crate::diagnostic::Diagnostic;
 use crate::locals::Locals;
 use crate::module::Module;
+pub use crate::signature::{NameUse, Signature};
 use crate::span::{SourceId, Span};
 use crate::symbol::Symbol;
 
@@ -120,9 +121,13 @@ pub trait Environment {
     }
     /// Returns a number for a fresh uninterned symbol of this compilation unit.
     fn fresh(&mut self) -> u32;
-    /// Names like `symbol` that are defined as a function or, if `variable`, as a variable; the likeliest
-    /// first.
-    fn similar(&self, symbol: &Symbol, variable: bool) -> Vec<Symbol>;
+    /// Names like `symbol` that are defined for such a use; the likeliest first.
+    fn similar(&self, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol>;
+    /// What is known of the parameters of the global function or macro that `cell` keeps; `cell` is its name,
+    /// or [`setf_cell`](crate::symbol::setf_cell) of that.
+    fn signature(&self, _cell: &Symbol) -> Option<Signature> {
+        None
+    }
 }
 
 /// Which macro is called.

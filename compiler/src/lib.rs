@@ -5,6 +5,7 @@ pub mod core;
 pub mod cover;
 pub mod diagnostic;
 pub mod expand;
+pub mod habit;
 pub mod lower;
 pub mod reader;
 mod resolve;

@@ -40,6 +40,22 @@ fn repair(text: &OpenText, diagnostic: &Diagnostic) -> Option<(String, TextEdit)
     let tree = &text.tree;
     let insert = |at: usize, new: String| TextEdit::new(text.range(at..at), new);
     match (&**code, quoted) {
+        ("undeclared-cause", Some(name)) if help.starts_with("did you mean") => {
+            // The finding may be about the whole form that names the cause.
+            let cause = diagnostic.message.split('`').nth(1)?;
+            let end = text.offset(diagnostic.range.end);
+            let is_cause = |&node: &NodeId| {
+                let range = tree.range(node);
+                (start..end).contains(&range.start)
+                    && tree.name(node).is_some_and(|name| name.eq_ignore_ascii_case(cause))
+            };
+            let place = tree.range(tree.nodes().find(is_cause)?);
+            Some((format!("Write `{name}`"), TextEdit::new(text.range(place), name.to_owned())))
+        }
+        ("foreign-word", Some(name)) if help.starts_with("write `") && !name.contains(['(', ' ']) => {
+            let place = tree.range(name_at(tree, start)?);
+            Some((format!("Write `{name}`"), TextEdit::new(text.range(place), name.to_owned())))
+        }
         (_, Some(name)) if help.starts_with("did you mean") => {
             let place = tree.range(name_at(tree, start)?);
             Some((format!("Write `{name}`"), TextEdit::new(text.range(place), name.to_owned())))

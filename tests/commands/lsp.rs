@@ -160,6 +160,32 @@ fn an_editor_is_helped_while_a_program_is_typed() {
 }
 
 #[test]
+fn a_misspelt_cause_is_written_as_declared() {
+    let folder = Folder::new("lsp_causes");
+    let path = folder.join("turn.esl");
+    let mut editor = Editor::new(&folder);
+    editor.open(
+        &path,
+        "(define-cause :wheel-stuck ())\n(defun turn (n)\n  (when n (fail :wheel-stuk n) None))\n",
+    );
+    let told = editor.diagnostics(&path, |told| !told.is_empty());
+    let mut titles = Vec::new();
+    for found in told {
+        let context = json!({ "diagnostics": [found] });
+        let asked =
+            json!({ "textDocument": { "uri": uri(&path) }, "range": found["range"], "context": context });
+        let actions = editor.ask("textDocument/codeAction", asked);
+        for action in actions.as_array().cloned().unwrap_or_default() {
+            let edit = &action["edit"]["changes"][uri(&path)][0];
+            let start = &edit["range"]["start"]["character"];
+            titles.push(format!("{} at {start}", action["title"].as_str().unwrap_or_default()));
+        }
+    }
+    assert_eq!(titles, ["Write `:wheel-stuck` at 16", "Write `nil` at 31"]);
+    editor.end();
+}
+
+#[test]
 fn renaming_changes_what_no_name_means() {
     let folder = Folder::new("lsp_rename");
     let mut editor = Editor::new(&folder);

@@ -266,6 +266,8 @@ warning[wrong-argument-count]: `car` takes 1 argument, but is given 2
   |
 4 | (defun é () (list 'é (car 1 2)))
   |                      ^^^^^^^^^
+  |
+  = help: it is called as `(car list)`
 
 ",
     ),

@@ -208,6 +208,11 @@ LITERAL_TOO_LARGE = "literal-too-large" Error
     fails: "(print #99999999(a))\n"
     repaired: "(print (make-array 99999999 :initial-element 'a))\n"
 
+FOREIGN_NOTATION = "foreign-notation" Error
+    /// Statements, comments, texts or commas as other languages write them.
+    fails: "(print 'hello')\n"
+    repaired: "(print \"hello\")\n"
+
 UNKNOWN_PACKAGE = "unknown-package" Error
     /// A prefix before `:` that is not the name of a package.
     fails: "(print (lisp:list 1 2))\n"
@@ -323,6 +328,16 @@ UNKNOWN_TAG = "unknown-tag" Error
     fails: "(tagbody\n  (go done)\n end)\n"
     repaired: "(tagbody\n  (go end)\n end)\n"
 
+FOREIGN_FORM = "foreign-form" Error
+    /// An operator between its operands, or a name before the parentheses of a call.
+    fails: "(print (1 + 2))\n"
+    repaired: "(print (+ 1 2))\n"
+
+FOREIGN_WORD = "foreign-word" Warning
+    /// A name that other languages have and ESL has not. The program may define it before it is used.
+    fails: "(defun first-of (list)\n  (if list (first list) None))\n"
+    repaired: "(defun first-of (list)\n  (if list (first list) nil))\n"
+
 UNDEFINED_FUNCTION = "undefined-function" Warning
     /// A call of a function that the program does not define. It may be defined by the time the call is made.
     fails: "(print (squar 3))\n"
@@ -342,6 +357,21 @@ WRONG_ARGUMENT_COUNT = "wrong-argument-count" Warning
     /// A call with more or fewer arguments than the function takes.
     fails: "(defun area (width height)\n  (* width height))\n(print (area 3))\n"
     repaired: "(defun area (width height)\n  (* width height))\n(print (area 3 4))\n"
+
+UNKNOWN_KEYWORD = "unknown-keyword" Warning
+    /// A call with a keyword argument that the function does not take.
+    fails: "(defun drive (distance &key (speed 1))\n  (* distance speed))\n(print (drive 3 :sped 5))\n"
+    repaired: "(defun drive (distance &key (speed 1))\n  (* distance speed))\n(print (drive 3 :speed 5))\n"
+
+WRONG_ARGUMENT = "wrong-argument" Warning
+    /// A constant argument that the function refuses, or that its format directives do not fit.
+    fails: "(defun next (n)\n  (format t \"~a and ~a~%\" n)\n  (+ n \"1\"))\n"
+    repaired: "(defun next (n)\n  (format t \"~a~%\" n)\n  (+ n 1))\n"
+
+MISSING_BODY = "missing-body" Warning
+    /// A form of the language whose name begins with `with-`, without forms to run.
+    fails: "(with-timeout (sleep 3))\n"
+    repaired: "(with-timeout 5\n  (sleep 3))\n"
 
 UNUSED_VARIABLE = "unused-variable" Warning
     /// A variable that is bound but never read.
@@ -411,6 +441,17 @@ AMOUNT_ABOVE_CAPACITY = "amount-above-capacity" Warning
             (with-resource (battery :amount 12)\n    (sleep 1)))\n"
     repaired: "(define-resource battery :capacity 12)\n(defun charge ()\n  \
                (with-resource (battery :amount 12)\n    (sleep 1)))\n"
+
+CONCURRENT_OPERATION = "concurrent-operation" Warning
+    /// A recovery procedure that calls an operation above the interrupted call of the same operation.
+    fails: "(define-mock drive (place)\n  (sleep 5)\n  place)\n(defvar *battery* 0)\n\
+            (with-recovery-procedures\n    ((:battery-low (drive 'dock) (abort 'charged)))\n  \
+            (with-guardian (loop until (< *battery* 1) do (sleep 1))\n      (fail :battery-low)\n    \
+            (drive 'lab)))\n"
+    repaired: "(define-mock drive (place)\n  (sleep 5)\n  place)\n(defvar *battery* 0)\n\
+               (when (eq (with-recovery-procedures\n              ((:battery-low (abort 'stopped)))\n            \
+               (with-guardian (loop until (< *battery* 1) do (sleep 1))\n                (fail :battery-low)\n              \
+               (drive 'lab)))\n          'stopped)\n  (drive 'dock))\n"
 
 UNDECLARED_CAUSE = "undeclared-cause" Warning
     /// A cause that is not declared, in a program that declares causes.

@@ -5,7 +5,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, bound_twice, check_distinct, name, on_one_line, quoted};
+use super::form::{Checked, Form, Make, bound_twice, check_distinct, name, on_one_line, plain, quoted};
 use super::function::Body;
 use super::job::{Job, LetBindings, PARTS_AT_ONCE, To, UncheckedLet, VariableBinding};
 use super::origin::OriginId;
@@ -55,7 +55,21 @@ fn written_bindings(form: &Form, shape: &str) -> Checked<Vec<Datum>> {
     let Some(list) = form.args.first() else { return Err(form.missing(shape)) };
     let Some(items) = list.as_list() else {
         let what = format!("{shape}, not {}", quoted(list));
-        return Err(form.fault(code::MALFORMED_BINDING, list.span(), &what));
+        let fault = form.fault(code::MALFORMED_BINDING, list.span(), &what);
+        // `(let x 1)` and `(let x = 1)`
+        let is_value = |part: &&Datum| part.as_symbol().is_none_or(|symbol| symbol.name() != "=");
+        let value = form.args[1..].iter().find(is_value);
+        return Err(match (list.as_symbol(), value) {
+            (Some(symbol), Some(value)) => {
+                let value = on_one_line(value, 20);
+                Box::new(fault.help(format!(
+                    "write `({} (({} {value})) …)`",
+                    plain(&form.operator),
+                    plain(symbol)
+                )))
+            }
+            _ => fault,
+        });
     };
     Ok(items.into_iter().cloned().collect())
 }
@@ -74,22 +88,41 @@ fn binding(
             Some([value]) => (datum, Some((*value).clone())),
             _ => {
                 let what = format!("needs one name and one value in each binding, not {}", quoted(item));
-                return Err(form.fault(code::MALFORMED_BINDING, item.span(), &what));
+                let fault = form.fault(code::MALFORMED_BINDING, item.span(), &what);
+                return Err(match bare_bindings(item).filter(|_| datum.as_symbol().is_some()) {
+                    Some(help) => Box::new(fault.help(help)),
+                    None => fault,
+                });
             }
         },
     };
     if item.as_cons().is_none() && item.as_symbol().is_none() && !item.is_nil() {
         let what = format!("needs bindings of a name and a value, not {}", quoted(item));
         let fault = form.fault(code::MALFORMED_BINDING, item.span(), &what);
-        // `(let (x 1) …)` lacks the parentheses around its only binding.
-        let list = &form.args[0];
-        let is_bare = list.as_list().is_some_and(|parts| parts.len() == 2 && parts[0].as_symbol().is_some());
-        let help = format!("a list of one binding is written `({})`", on_one_line(list, 40));
-        return Err(if is_bare { Box::new(fault.help(help)) } else { fault });
+        let help = bare_bindings(&form.args[0]);
+        return Err(help.map_or(fault.clone(), |help| Box::new(fault.help(help))));
     }
     let symbol = expander.variable_name(environment, datum, form, Deed::Bind)?;
     let value = value.unwrap_or_else(|| Datum::nil(form.at(datum.span())));
     Ok(VariableBinding { datum: datum.clone(), symbol, value })
+}
+
+/// Returns how bindings are written that lack the parentheses around each: `(x 1 y 2)`.
+fn bare_bindings(list: &Datum) -> Option<String> {
+    let parts = list.as_list()?;
+    // Clojure writes `[x 1]`, and others `x = 1`.
+    let plain_parts: Vec<&Datum> =
+        parts.into_iter().filter(|part| part.as_symbol().is_none_or(|symbol| symbol.name() != "=")).collect();
+    let is_pair = |pair: &&[&Datum]| pair.len() == 2 && pair[0].as_symbol().is_some();
+    let pairs: Vec<&[&Datum]> = plain_parts.chunks(2).collect();
+    if pairs.len() > 4 || !pairs.iter().all(|pair| is_pair(&pair)) {
+        return None;
+    }
+    let pairs = pairs
+        .iter()
+        .map(|pair| Some(format!("({} {})", plain(pair[0].as_symbol()?), on_one_line(pair[1], 20))));
+    let pairs: Option<Vec<String>> = pairs.collect();
+    Some(format!("each binding has parentheses of its own: write `({})`", pairs?.join(" ")))
 }
 
 /// `(let ({name | (name [value])}*) . body)`

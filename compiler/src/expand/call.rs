@@ -5,10 +5,11 @@ use esl_bytecode::compile::{Arity, Environment, Global, GlobalFunction, MacroRef
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
 
+use super::argument::{refused, usage};
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, arguments, constant_value, is_cl_form, name};
+use super::form::{Checked, Form, Make, arguments, constant_value, infix, is_cl_form, is_known, name};
 use super::function::{FunctionName, WrittenName};
-use super::global::{accepts, wrong_count};
+use super::global::{PendingCall, accepts, is_checked_constant, wrong_count};
 use super::job::{AwaitedOutcome, Job, To};
 use super::lambda_list::{LambdaList, LambdaListKind};
 use super::scope::{FunctionMeaning, Visible};
@@ -62,6 +63,9 @@ impl Expander {
 
     fn global_operation(&mut self, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
         let global = environment.global(&form.operator);
+        if global.locked {
+            self.check_written(environment, &form, to.origin);
+        }
         if self.globals.is_broken_macro(&form.operator) {
             self.fill(to, NodeKind::Constant(Datum::nil(to.span)));
             return Ok(());
@@ -86,7 +90,8 @@ impl Expander {
         }
         if global.locked && global.instead.is_some() {
             // The arguments need not be forms. They are left out of the call, which fails in any case.
-            self.globals.note_call(FunctionName::plain(&form.operator), None, form.span, form.span);
+            let place = self.place_of_use(form.span, to);
+            self.globals.note_reference(FunctionName::plain(&form.operator), place);
             self.fill(to, NodeKind::Call(Callee::Global(form.operator.clone()), Vec::new()));
             return Ok(());
         }
@@ -162,7 +167,7 @@ impl Expander {
                 (Callee::Local(variable), Vec::new())
             }
             FunctionDesignator::Global(function) => {
-                (self.global_callee(environment, &function, Some(count), form, to)?, Vec::new())
+                (self.global_callee(environment, &function, Some(args), form, to)?, Vec::new())
             }
             FunctionDesignator::Named(function) => (named_callee(&function, Some(count)), Vec::new()),
             FunctionDesignator::Form(function) => {
@@ -180,33 +185,73 @@ impl Expander {
         Ok(())
     }
 
-    /// Returns the global function `function` as a callee. `count` is the number of arguments, if that is
-    /// known.
+    /// Returns the global function `function` as a callee. `args` are all arguments, if these are known.
     fn global_callee(
         &mut self,
         environment: &mut dyn Environment,
         function: &WrittenName,
-        count: Option<usize>,
+        args: Option<&[Datum]>,
         form: &Form,
         to: To,
     ) -> Checked<Callee> {
         function.check_callable(form)?;
         let builtin = if function.name.is_setf { None } else { Builtin::named(&function.cell) };
         let Some(builtin) = builtin else {
-            let named = form.at(function.datum.span());
-            self.globals.note_call(function.name.clone(), count, named, to.span);
+            let name = self.place_of_use(form.at(function.datum.span()), to);
+            match args {
+                None => self.globals.note_reference(function.name.clone(), name),
+                Some(args) => {
+                    let constants = args.iter().enumerate().filter(|(_, datum)| is_checked_constant(datum));
+                    let constants = constants.map(|(index, datum)| (index as u32, datum.clone())).collect();
+                    self.globals.note_call(PendingCall {
+                        function: function.name.clone(),
+                        arguments: Some(u32::try_from(args.len()).unwrap_or(u32::MAX)),
+                        constants,
+                        infix: infix(function.datum.as_symbol().map(|_| &function.datum), args, to.span)
+                            .map(Box::new),
+                        is_guarded: self.is_guarded(to.span),
+                        name,
+                        span: to.span,
+                    });
+                }
+            }
             return Ok(Callee::Global(function.cell.clone()));
         };
         let arity = builtin.info().arity;
-        let Some(count) = count.map(|count| u32::try_from(count).unwrap_or(u32::MAX)) else {
-            return Ok(Callee::Builtin(builtin));
-        };
+        let Some(args) = args else { return Ok(Callee::Builtin(builtin)) };
+        let count = u32::try_from(args.len()).unwrap_or(u32::MAX);
         if !accepts(arity, count) {
-            self.report(wrong_count(&function.name.shown(), arity, count, to.span), to.origin);
+            let warning = wrong_count(&function.name.shown(), arity, count, to.span);
+            let list = environment.signature(&function.cell);
+            let called =
+                list.map(|known| format!("it is called as {}", usage(&function.cell, &known.lambda_list)));
+            self.report(called.into_iter().fold(warning, |warning, help| warning.help(help)), to.origin);
             return Ok(Callee::Global(function.cell.clone()));
         }
+        self.check_constants(environment, builtin, args, form, to);
         self.check_defining(environment, builtin, form, to)?;
         Ok(Callee::Builtin(builtin))
+    }
+
+    /// Warns of the first constant argument that a builtin refuses, unless the failure is handled.
+    fn check_constants(
+        &mut self,
+        environment: &dyn Environment,
+        builtin: Builtin,
+        args: &[Datum],
+        form: &Form,
+        to: To,
+    ) {
+        let Some((argument, what)) = refused(builtin, args) else { return };
+        if self.is_guarded(to.span) || !is_known(self.origins.written(form.datum.span(), to.origin)) {
+            return;
+        }
+        let function = builtin.symbol();
+        let warning =
+            code::WRONG_ARGUMENT.at(form.at(argument.span()), format!("{} takes {what}", name(&function)));
+        let known = environment.signature(&function);
+        let called = known.map(|known| format!("it is called as {}", usage(&function, &known.lambda_list)));
+        self.report(called.into_iter().fold(warning, |warning, help| warning.help(help)), to.origin);
     }
 
     /// Expands `((lambda …) …)`.

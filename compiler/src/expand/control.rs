@@ -7,7 +7,7 @@ use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashSet;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, is_constant, is_known, name, plain, quoted};
+use super::form::{Checked, Form, infix, is_constant, is_known, name, on_one_line, plain, quoted};
 use super::job::{Job, LongCond, PARTS_AT_ONCE, To};
 use super::scope::{ScopeEntry, Tag, Visible};
 use crate::core::{BlockId, BoundVariable, NodeId, NodeKind, TagbodyItem};
@@ -29,7 +29,8 @@ pub(super) fn quote_object(expander: &mut Expander, _: &mut dyn Environment, for
 
 /// `(if test then [else])`
 pub(super) fn if_(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
-    form.takes(2..=3, "takes a test, a form for true, and at most one for false")?;
+    form.takes(2..=3, "takes a test, a form for true, and at most one for false")
+        .map_err(|fault| foreign_if(&form).map_or(fault, Box::new))?;
     let nil = Datum::nil(to.span);
     let (test, first) = expander.part(form.args[0].clone(), to);
     let then = expander.result(to);
@@ -39,6 +40,27 @@ pub(super) fn if_(expander: &mut Expander, _: &mut dyn Environment, form: Form, 
     let third = Job::Expand(form.args.get(2).cloned().unwrap_or(nil), otherwise);
     expander.schedule([first, second, third]);
     Ok(())
+}
+
+/// Returns the error about an `if` with `then` and `else`, or with an operator in its test.
+fn foreign_if(form: &Form) -> Option<Diagnostic> {
+    let is_word = |part: &Datum, word| part.as_symbol().is_some_and(|symbol| symbol.name() == word);
+    let message = "the parts of an `if` stand one after the other, without words between them";
+    let written = match form.args.as_slice() {
+        [test, word, then] if is_word(word, "THEN") => vec![test, then],
+        [test, word, then, otherwise_word, otherwise]
+            if is_word(word, "THEN") && is_word(otherwise_word, "ELSE") =>
+        {
+            vec![test, then, otherwise]
+        }
+        [test, then, word, otherwise] if is_word(word, "ELSE") => vec![test, then, otherwise],
+        [left, operator, right, ..] => {
+            return infix(Some(left), &[operator.clone(), right.clone()], form.span);
+        }
+        _ => return None,
+    };
+    let written: Vec<String> = written.into_iter().map(|part| on_one_line(part, 20)).collect();
+    Some(code::FOREIGN_FORM.at(form.span, message).help(format!("write `(if {})`", written.join(" "))))
 }
 
 /// `(progn . body)`
@@ -255,10 +277,26 @@ fn leave(expander: &mut Expander, form: &Form, block: &Symbol, value: Option<&Da
     Ok(())
 }
 
+/// Returns the name of the only named block around a form; `None` if there are several.
+fn named_block(expander: &Expander) -> Option<&Symbol> {
+    let mut names = expander.scope.block_names().filter(|name| !name.is_cl("NIL"));
+    names.next().filter(|_| names.next().is_none())
+}
+
 fn unknown_block(expander: &Expander, form: &Form, block: &Symbol) -> Box<Diagnostic> {
     if block.is_cl("NIL") {
         let message = format!("{} needs a loop or a `(block nil …)` around it", name(&form.operator));
-        return Box::new(code::UNKNOWN_BLOCK.at(form.head(), message));
+        let diagnostic = code::UNKNOWN_BLOCK.at(form.head(), message);
+        // The name of a function is the name of the block around its forms.
+        let Some(function) = named_block(expander) else {
+            return Box::new(diagnostic);
+        };
+        let (function, value) = (plain(function), form.args.first().map(|value| on_one_line(value, 20)));
+        let value = value.map_or(String::new(), |value| format!(" {value}"));
+        let help = format!(
+            "the last form of a function is its value; to leave earlier, write `(return-from {function}{value})`"
+        );
+        return Box::new(diagnostic.help(help));
     }
     let message = format!("there is no block called {} around this {}", name(block), name(&form.operator));
     let named = form.args.first().map_or(form.span, Datum::span);

@@ -11,8 +11,9 @@ use esl_bytecode::symbol::Symbol;
 use super::call::quoted_symbol;
 use super::chunk::Purpose;
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, fresh, name, quoted};
+use super::form::{Checked, Form, Make, fresh, name, on_one_line, operator, plain, quoted};
 use super::function::{Body, FunctionParts, WrittenName};
+use super::global::DefinedFunction;
 use super::job::{Job, To};
 use super::origin::OriginId;
 use crate::core::{Callee, NodeKind};
@@ -103,7 +104,16 @@ pub(super) fn defun(
     let shape = "needs a name and a lambda list";
     let Some(named) = form.args.first() else { return Err(form.missing(shape)) };
     let Some(function) = WrittenName::of(named) else {
-        return Err(form.not_a_name(named, "needs a name as its first part"));
+        let fault = form.not_a_name(named, "needs a name as its first part");
+        // Scheme writes `(define (f x) …)`.
+        return Err(match (operator(named), named.as_cons()) {
+            (Some(function), Some((_, list))) => Box::new(fault.help(format!(
+                "write `(defun {} {} …)`",
+                plain(function),
+                on_one_line(list, 40)
+            ))),
+            _ => fault,
+        });
     };
     let outcome = define_function(expander, environment, &form, &function, to);
     if outcome.is_err() {
@@ -131,7 +141,11 @@ fn define_function(
     };
     let text = expander.lambda_text(environment, parts, form, to.origin)?;
     if is_definable {
-        expander.globals.note_definition(function.name.clone(), text.arity());
+        let keys = text.list.keys.as_ref().filter(|_| !text.list.allow_other_keys);
+        let keys = keys.map(|keys| keys.iter().map(|key| key.key.clone()).collect());
+        let (arity, lambda_list) = (text.arity(), text.shown.clone());
+        let defined = DefinedFunction { arity, lambda_list, keys, place: span };
+        expander.globals.note_definition(function.name.clone(), defined);
     }
 
     let mut call = to;
@@ -159,6 +173,7 @@ pub(super) fn defmacro(
     let symbol = form.symbol(0, "needs a symbol as its first part, and a lambda list")?;
     if expander.check_definable(environment, &symbol, form.at(form.args[0].span()), &form, to)? {
         expander.note_macro(&symbol);
+        expander.globals.note_macro(&symbol, form.at(form.args[0].span()));
     }
     form.takes(2..=usize::MAX, "needs a name and a lambda list")?;
     // The definition keeps its place in the source, so that its unused variables are reported.

@@ -97,6 +97,8 @@ pub struct Expander {
     pub(super) checked_parts: u64,
     /// Uses and definitions of global names.
     pub(super) globals: GlobalUses,
+    /// Forms of the current top-level form that handle failures.
+    pub(super) guards: Vec<Span>,
 }
 
 impl Expander {
@@ -123,6 +125,7 @@ impl Expander {
             unmeasured: 0,
             checked_parts: 0,
             globals: GlobalUses::default(),
+            guards: Vec::new(),
         }
     }
 
@@ -141,6 +144,7 @@ impl Expander {
     fn begin(&mut self, form: Datum, top: Top) {
         debug_assert!(self.jobs.is_empty() && self.open.is_empty(), "the last form is finished");
         self.origins.clear();
+        self.guards.clear();
         self.is_too_deep = false;
         self.is_given_up = false;
         self.passed = 0;
@@ -174,24 +178,6 @@ impl Expander {
         let jobs = self.jobs.capacity() * size_of::<Job>();
         let open: usize = self.open.iter().map(|open| open.core.bytes()).sum();
         jobs + open + self.origins.bytes()
-    }
-
-    /// Takes the findings so far.
-    pub fn take_diagnostics(&mut self) -> Vec<Diagnostic> {
-        std::mem::take(&mut self.diagnostics)
-    }
-
-    /// Finishes the unit: returns the findings so far, undefined names, and calls with a wrong number of
-    /// arguments.
-    pub fn finish(&mut self, environment: &dyn Environment) -> Vec<Diagnostic> {
-        let mut findings = self.take_diagnostics();
-        findings.extend(self.globals.finish(environment));
-        findings
-    }
-
-    /// Returns the number of errors found so far.
-    pub fn errors(&self) -> usize {
-        self.errors
     }
 
     /// Whether the compiler itself expands forms of the operator `symbol`.
@@ -381,11 +367,12 @@ impl Expander {
         &mut self,
         operator: &Symbol,
         span: Span,
+        form: Option<&Datum>,
         is_standard: bool,
         around: Option<OriginId>,
     ) -> Checked<Option<OriginId>> {
         self.measure(around, span)?;
-        let origin = self.origins.enter(operator, span, is_standard, around);
+        let origin = self.origins.enter(operator, span, form, is_standard, around);
         self.is_given_up |= origin.is_err();
         origin
     }
@@ -418,7 +405,7 @@ impl Expander {
         around: Option<OriginId>,
         waiting: impl FnOnce(Option<OriginId>) -> AwaitedOutcome,
     ) -> Checked {
-        let origin = self.enter_origin(&form.operator, form.span, is_standard, around)?;
+        let origin = self.enter_origin(&form.operator, form.span, Some(&form.datum), is_standard, around)?;
         self.waiting = waiting(origin);
         self.call = Some(form.datum.clone());
         let locals = self.scope.locals().clone();

@@ -1,5 +1,6 @@
 //! Findings: what is reported of a form, and of the macro that made it.
 
+use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
@@ -8,12 +9,31 @@ use super::expander::Expander;
 use super::failure::MacroFailure;
 use super::form::{is_known, name, span_of};
 use super::origin::OriginId;
+use super::unit::UnitFindings;
 use crate::diagnostic::code;
 
 /// Findings beyond which no more warnings are kept: nobody reads so many, and they take memory.
 const MAX_FINDINGS: usize = 10_000;
 
 impl Expander {
+    /// Takes the findings so far.
+    pub fn take_diagnostics(&mut self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.diagnostics)
+    }
+
+    /// Finishes the unit: returns the findings so far, undefined names, and calls with unsuitable arguments.
+    /// Undefined names are left out unless the unit `is_whole`.
+    pub fn finish(&mut self, environment: &dyn Environment, is_whole: bool) -> UnitFindings {
+        let mut findings = self.globals.finish(environment, is_whole);
+        findings.diagnostics.splice(..0, self.take_diagnostics());
+        findings
+    }
+
+    /// Returns the number of errors found so far.
+    pub fn errors(&self) -> usize {
+        self.errors
+    }
+
     /// Reports the failure of the macro whose call at `span` the expander stopped for.
     pub(super) fn macro_failed(&mut self, failure: &MacroFailure, origin: Option<OriginId>, span: Span) {
         let origin = origin.map(|origin| self.origins.get(origin));

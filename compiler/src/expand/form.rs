@@ -11,6 +11,7 @@ use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 use rustc_hash::FxHashMap;
 
 use crate::diagnostic::{DiagnosticCode, code};
+use crate::habit::operator::between;
 
 /// Outcome of a check of a form.
 pub(super) type Checked<T = ()> = Result<T, Box<Diagnostic>>;
@@ -127,6 +128,11 @@ impl Form {
 
 /// The error for a form that begins with something other than the name of an operator.
 fn not_an_operator(form: &Datum, head: &Datum, span: Span) -> Box<Diagnostic> {
+    let args: Vec<Datum> =
+        form.as_cons().map(|(_, rest)| rest.elements().take(3).cloned().collect()).unwrap_or_default();
+    if let Some(foreign) = infix(Some(head), &args, span_of(form, span)) {
+        return Box::new(foreign);
+    }
     let message =
         format!("expected the name of an operator at the beginning of a form, found {}", quoted(head));
     let diagnostic = code::NOT_AN_OPERATOR.at(span_of(head, span), message);
@@ -138,6 +144,22 @@ fn not_an_operator(form: &Datum, head: &Datum, span: Span) -> Box<Diagnostic> {
         _ if form.as_list().is_some() => diagnostic.help("to make a list, write `(list …)` or quote it"),
         _ => diagnostic,
     })
+}
+
+/// Returns the error about a form at `span` whose first two parts are `left` and an operator that stands
+/// between its operands; `None` for other forms.
+pub(super) fn infix(left: Option<&Datum>, args: &[Datum], span: Span) -> Option<Diagnostic> {
+    let (Some(left), [operator, right, rest @ ..]) = (left, args) else { return None };
+    let symbol = operator.as_symbol().filter(|symbol| symbol.name().len() <= 3 && !symbol.is_keyword())?;
+    let own = between(symbol.name())?;
+    let shown = |part: &Datum| on_one_line(part, 20);
+    let written = match (own, rest) {
+        (_, []) => format!("({own} {} {})", shown(left), shown(right)),
+        _ => format!("({own} {} …)", shown(left)),
+    };
+    let message =
+        format!("the operator {} stands first in its form, not between its operands", quoted(operator));
+    Some(code::FOREIGN_FORM.at(span, message).help(format!("write `{written}`")))
 }
 
 /// Whether a span is a place in a source. Data made by a program have an empty span.

@@ -1,65 +1,113 @@
-//! Global names of a compilation unit: findings that are known only at its end, namely undefined functions
-//! and variables, undeclared causes, and calls with a wrong number of arguments.
+//! Global names of a compilation unit: their uses and definitions, as far as they matter for findings that
+//! are known only at the end of the unit (`unit`).
 
-use esl_bytecode::compile::{Arity, Environment, GlobalFunction, GlobalVariable};
-use esl_bytecode::datum::Datum;
-use esl_bytecode::diagnostic::{Diagnostic, Label};
+use esl_bytecode::compile::Arity;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::form::{name, name_with_package, plain, with_namesake};
 use super::function::FunctionName;
+use super::trap::GuardianTrap;
 use crate::diagnostic::code;
 
-/// Uses of an undefined name that are shown besides the first.
-const SHOWN: usize = 3;
-/// Undefined names for which similar ones are suggested; each suggestion looks at all names.
-const COMPARED: usize = 50;
+/// A place at which a global name is used.
+#[derive(Clone, Debug)]
+pub(super) struct NameUsed {
+    /// The place.
+    pub(super) span: Span,
+    /// The macro of the program whose expansion contains the use.
+    pub(super) maker: Option<Symbol>,
+}
 
-/// A call of a global function.
+/// A call of a global function, or a reference to it.
 #[derive(Debug)]
-struct PendingCall {
-    function: FunctionName,
+pub(super) struct PendingCall {
+    pub(super) function: FunctionName,
     /// Number of arguments; `None` if it is unknown, or the function is only referred to.
-    arguments: Option<u32>,
+    pub(super) arguments: Option<u32>,
+    /// Arguments that are constants, with their positions.
+    pub(super) constants: Vec<(u32, Datum)>,
+    /// The form, if it is one with an operator between its operands.
+    pub(super) infix: Option<Box<Diagnostic>>,
+    /// Whether a form around it handles failures, so that the call may be meant to fail.
+    pub(super) is_guarded: bool,
     /// Place of the name.
-    name: Span,
+    pub(super) name: NameUsed,
     /// Place of the call.
-    span: Span,
+    pub(super) span: Span,
+}
+
+/// A use of a variable that had no definition.
+#[derive(Debug)]
+pub(super) struct PendingVariable {
+    pub(super) symbol: Symbol,
+    pub(super) place: NameUsed,
+    /// Whether a form that is being looked at binds the name, though not there.
+    pub(super) is_bound_later: bool,
+}
+
+/// A function that the unit defines.
+#[derive(Clone, Debug)]
+pub(super) struct DefinedFunction {
+    pub(super) arity: Arity,
+    pub(super) lambda_list: Datum,
+    /// The names that select keyword arguments; `None` if it takes none, or any.
+    pub(super) keys: Option<Vec<Symbol>>,
+    /// Place of its name.
+    pub(super) place: Span,
+}
+
+/// Arguments that the program gives to a cause of failures, or that its procedures name.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CauseArguments {
+    pub(super) count: u32,
+    pub(super) place: Span,
 }
 
 /// Uses and definitions of global names in a compilation unit.
 #[derive(Debug, Default)]
 pub(super) struct GlobalUses {
-    calls: Vec<PendingCall>,
-    variables: Vec<(Symbol, Span)>,
+    pub(super) calls: Vec<PendingCall>,
+    pub(super) variables: Vec<PendingVariable>,
     /// Variables that forms of the unit define at run time.
-    defined_variables: FxHashSet<Symbol>,
+    pub(super) defined_variables: FxHashSet<Symbol>,
     /// Causes of failures that the unit names.
-    causes: Vec<(Symbol, Span)>,
-    /// Functions that the unit defines; without an arity if several definitions differ in it.
-    functions: FxHashMap<FunctionName, Option<Arity>>,
+    pub(super) causes: Vec<(Symbol, Span)>,
+    /// Calls of `fail` with a constant cause.
+    pub(super) failures: Vec<(Symbol, CauseArguments)>,
+    /// Of the recovery procedures for a cause, the one that names the fewest arguments.
+    pub(super) procedures: FxHashMap<Symbol, CauseArguments>,
+    /// Operations that recovery procedures call above calls of the same.
+    pub(super) traps: Vec<GuardianTrap>,
+    /// Names that the unit uses as operations.
+    pub(super) operations: FxHashSet<Symbol>,
+    /// Functions that the unit defines; `None` if several definitions differ in the number of arguments.
+    pub(super) functions: FxHashMap<FunctionName, Option<Box<DefinedFunction>>>,
+    /// Macros that the unit defines, and the places of their names.
+    pub(super) macros: FxHashMap<Symbol, Span>,
     /// Macros with faulty definitions, whose calls are not checked.
     broken_macros: FxHashSet<Symbol>,
 }
 
 impl GlobalUses {
-    /// Notes a call or a reference.
-    pub(super) fn note_call(
-        &mut self,
-        function: FunctionName,
-        arguments: Option<usize>,
-        name: Span,
-        span: Span,
-    ) {
-        let arguments = arguments.map(|count| u32::try_from(count).unwrap_or(u32::MAX));
-        self.calls.push(PendingCall { function, arguments, name, span });
+    /// Notes a call.
+    pub(super) fn note_call(&mut self, call: PendingCall) {
+        self.calls.push(call);
+    }
+
+    /// Notes a reference to a function, of which no number of arguments is known.
+    pub(super) fn note_reference(&mut self, function: FunctionName, name: NameUsed) {
+        let span = name.span;
+        let (constants, infix) = Default::default();
+        let call = PendingCall { function, arguments: None, constants, infix, is_guarded: false, name, span };
+        self.calls.push(call);
     }
 
     /// Notes a use of a variable that has no definition so far.
-    pub(super) fn note_variable(&mut self, symbol: &Symbol, span: Span) {
-        self.variables.push((symbol.clone(), span));
+    pub(super) fn note_variable(&mut self, variable: PendingVariable) {
+        self.variables.push(variable);
     }
 
     /// Notes that a form of the unit defines a variable at run time.
@@ -68,15 +116,19 @@ impl GlobalUses {
     }
 
     /// Notes the definition of a function.
-    pub(super) fn note_definition(&mut self, function: FunctionName, arity: Arity) {
+    pub(super) fn note_definition(&mut self, function: FunctionName, defined: DefinedFunction) {
+        let arity = defined.arity;
         self.functions
             .entry(function)
             .and_modify(|known| {
-                if *known != Some(arity) {
+                if known.as_ref().is_some_and(|known| known.arity != arity) {
                     *known = None;
+                } else if let Some(known) = known {
+                    // Which of the definitions holds when a call is made is unknown.
+                    known.keys = None;
                 }
             })
-            .or_insert(Some(arity));
+            .or_insert(Some(Box::new(defined)));
     }
 
     /// Notes that the definition of a function is faulty, so that its calls are not checked.
@@ -89,6 +141,24 @@ impl GlobalUses {
         self.causes.push((cause.clone(), span));
     }
 
+    /// Notes a call of `fail` with this cause.
+    pub(super) fn note_failure(&mut self, cause: &Symbol, given: CauseArguments) {
+        self.failures.push((cause.clone(), given));
+    }
+
+    /// Notes a recovery procedure for this cause.
+    pub(super) fn note_procedure(&mut self, cause: &Symbol, named: CauseArguments) {
+        let least = self.procedures.entry(cause.clone()).or_insert(named);
+        if named.count < least.count {
+            *least = named;
+        }
+    }
+
+    /// Notes the definition of a macro, whose name stands at `span`.
+    pub(super) fn note_macro(&mut self, symbol: &Symbol, span: Span) {
+        self.macros.insert(symbol.clone(), span);
+    }
+
     /// Notes that the definition of a macro is faulty.
     pub(super) fn note_broken_macro(&mut self, symbol: &Symbol) {
         self.broken_macros.insert(symbol.clone());
@@ -98,159 +168,6 @@ impl GlobalUses {
     pub(super) fn is_broken_macro(&self, symbol: &Symbol) -> bool {
         self.broken_macros.contains(symbol)
     }
-
-    /// Returns the findings at the end of the unit.
-    pub(super) fn finish(&mut self, environment: &dyn Environment) -> Vec<Diagnostic> {
-        let mut findings = Vec::new();
-        let mut undefined: Vec<(FunctionName, Vec<Span>)> = Vec::new();
-        let mut known: FxHashMap<FunctionName, usize> = FxHashMap::default();
-        for call in std::mem::take(&mut self.calls) {
-            let arity = match self.functions.get(&call.function) {
-                Some(arity) => *arity,
-                None => match global(environment, &call.function) {
-                    GlobalFunction::Function(arity) => arity,
-                    // A call before the definition of the macro fails when it is made.
-                    GlobalFunction::Macro => {
-                        let message =
-                            format!("{} is used as a function here, and a macro", call.function.shown());
-                        findings.push(
-                            code::UNDEFINED_FUNCTION.at(call.name, message).help("define the macro first"),
-                        );
-                        continue;
-                    }
-                    GlobalFunction::Undefined => {
-                        match known.get(&call.function) {
-                            Some(&index) => undefined[index].1.push(call.name),
-                            None => {
-                                known.insert(call.function.clone(), undefined.len());
-                                undefined.push((call.function, vec![call.name]));
-                            }
-                        }
-                        continue;
-                    }
-                },
-            };
-            if let (Some(arity), Some(count)) = (arity, call.arguments)
-                && !accepts(arity, count)
-            {
-                let warning = wrong_count(&call.function.shown(), arity, count, call.span);
-                findings.push(with_namesake(warning, &call.function.symbol));
-            }
-        }
-        let mut reported = FxHashSet::default();
-        for (cause, span) in std::mem::take(&mut self.causes) {
-            if let Some(warning) = undeclared(environment, &cause, span)
-                && reported.insert(cause)
-            {
-                findings.push(warning);
-            }
-        }
-        let mut similar = Similar { environment, left: COMPARED };
-        findings.extend(
-            undefined.into_iter().map(|(function, uses)| similar.undefined_function(&function, &uses)),
-        );
-        findings.extend(self.undefined_variables(similar));
-        findings
-    }
-
-    fn undefined_variables(&mut self, mut similar: Similar<'_>) -> Vec<Diagnostic> {
-        let mut uses: Vec<(Symbol, Vec<Span>)> = Vec::new();
-        let mut known: FxHashMap<Symbol, usize> = FxHashMap::default();
-        for (symbol, span) in std::mem::take(&mut self.variables) {
-            let is_defined = self.defined_variables.contains(&symbol)
-                || !matches!(similar.environment.global(&symbol).variable, GlobalVariable::Undefined);
-            if is_defined {
-                continue;
-            }
-            let index = *known.entry(symbol.clone()).or_insert(uses.len());
-            match uses.get_mut(index) {
-                Some((_, spans)) => spans.push(span),
-                None => uses.push((symbol, vec![span])),
-            }
-        }
-        uses.into_iter()
-            .map(|(symbol, spans)| {
-                if let Some(instead) = similar.environment.global(&symbol).instead {
-                    let message =
-                        format!("{} is not in the subset of Common Lisp that ESL has", name(&symbol));
-                    return code::NAME_NOT_IN_SUBSET.at(spans[0], message).help(instead);
-                }
-                let message = format!("no variable is called {}", name(&symbol));
-                let diagnostic = with_uses(code::UNDEFINED_VARIABLE.at(spans[0], message), &spans[1..]);
-                similar.help(diagnostic, &symbol, true)
-            })
-            .collect()
-    }
-}
-
-fn global(environment: &dyn Environment, function: &FunctionName) -> GlobalFunction {
-    if function.is_setf {
-        environment.setf_function(&function.symbol)
-    } else {
-        environment.global(&function.symbol).function
-    }
-}
-
-/// The warning about an undeclared cause, if the program declares causes at all.
-fn undeclared(environment: &dyn Environment, cause: &Symbol, span: Span) -> Option<Diagnostic> {
-    let property = |of: &Symbol, indicator: &str| -> Option<Datum> {
-        environment.property(of, &Symbol::esl(indicator)).filter(|value| !value.is_nil())
-    };
-    property(&Symbol::esl("DEFINE-CAUSE"), "%USED")?;
-    if cause.name() == "GENERAL-FAILURE" || property(cause, "%CAUSE").is_some() {
-        return None;
-    }
-    let message = format!("no cause is called {}", name(cause));
-    let help = format!("declare it with `(define-cause {} ())`", plain(cause));
-    Some(code::UNDECLARED_CAUSE.at(span, message).help(help))
-}
-
-/// Suggests names that resemble undefined ones.
-struct Similar<'a> {
-    environment: &'a dyn Environment,
-    /// Number of further suggestions.
-    left: usize,
-}
-
-impl Similar<'_> {
-    fn undefined_function(&mut self, function: &FunctionName, uses: &[Span]) -> Diagnostic {
-        if !function.is_setf
-            && let Some(instead) = self.environment.global(&function.symbol).instead
-        {
-            let message = format!("{} is not in the subset of Common Lisp that ESL has", function.shown());
-            return code::NAME_NOT_IN_SUBSET.at(uses[0], message).help(instead);
-        }
-        let message = format!("no function is called {}", function.shown());
-        let diagnostic = with_uses(code::UNDEFINED_FUNCTION.at(uses[0], message), &uses[1..]);
-        if function.is_setf {
-            let place = plain(&function.symbol);
-            let help =
-                format!("define it with `(defun (setf {place}) (value …) …)` or `(defsetf {place} …)`");
-            return diagnostic.help(help);
-        }
-        self.help(diagnostic, &function.symbol, false)
-    }
-
-    fn help(&mut self, diagnostic: Diagnostic, symbol: &Symbol, variable: bool) -> Diagnostic {
-        if self.left == 0 {
-            return diagnostic;
-        }
-        self.left -= 1;
-        match self.environment.similar(symbol, variable).first() {
-            Some(similar) if similar.name() == symbol.name() => {
-                diagnostic.help(format!("did you mean {}?", name_with_package(similar)))
-            }
-            Some(similar) => diagnostic.help(format!("did you mean {}?", name(similar))),
-            None => diagnostic,
-        }
-    }
-}
-
-fn with_uses(mut diagnostic: Diagnostic, further: &[Span]) -> Diagnostic {
-    for &span in further.iter().filter(|span| **span != diagnostic.primary.span).take(SHOWN) {
-        diagnostic.secondary.push(Label { span, text: "and here".into() });
-    }
-    diagnostic
 }
 
 /// Whether a function of this arity takes `count` arguments.
@@ -274,4 +191,13 @@ pub(super) fn wrong_count(function: &str, arity: Arity, count: u32, span: Span) 
 
 fn arguments(count: u32) -> String {
     if count == 1 { "1 argument".to_string() } else { format!("{count} arguments") }
+}
+
+/// Whether a datum is a constant that calls are checked for.
+pub(super) fn is_checked_constant(datum: &Datum) -> bool {
+    match datum.kind() {
+        DatumKind::Symbol(symbol) => symbol.is_keyword(),
+        DatumKind::Cons(..) | DatumKind::Object(_) => false,
+        _ => true,
+    }
 }

@@ -168,7 +168,8 @@ impl Expander {
                 return Err(no_function(form, function));
             }
         }
-        self.globals.note_call(function.name.clone(), None, to.span, to.span);
+        let place = self.place_of_use(to.span, to);
+        self.globals.note_reference(function.name.clone(), place);
         Ok(NodeKind::FunctionRef(function.cell.clone()))
     }
 }

@@ -101,7 +101,11 @@ impl Parser {
     fn parse(mut self, list: &Datum) -> Checked<LambdaList> {
         let is_list = matches!(list.kind(), DatumKind::Cons(..) | DatumKind::Nil);
         if !is_list && (self.kind != LambdaListKind::Pattern || list.as_symbol().is_none()) {
-            return Err(self.wrong(list, &format!("a lambda list is a list, not {}", quoted(list))));
+            let fault = self.wrong(list, &format!("a lambda list is a list, not {}", quoted(list)));
+            let name = list.as_symbol().map(plain).unwrap_or_default();
+            let name = name.trim_start_matches('[').trim_end_matches(']');
+            let is_name = !name.is_empty() && !name.starts_with(':');
+            return Err(if is_name { Box::new(fault.help(format!("write `({name})`"))) } else { fault });
         }
         let mut elements = list.elements();
         while let Some(item) = elements.next() {

@@ -69,19 +69,23 @@
 //! # Layers
 //!
 //! Data and tables come first (`form`, `scope`, `lambda_list`, `function`, `setf`, `origin`, `job`, `chunk`,
-//! `failure`, `global`), then the [`Expander`] and its findings (`finding`), then one file for each family
-//! of forms, whose methods are methods of the `Expander`, and last the table of operators. A file uses only
+//! `failure`, `trap`, `global`, `argument`, `directive`, `unit`), then the [`Expander`], its findings
+//! (`finding`) and its checks of forms as they are written (`check`), then one file for each family of
+//! forms, whose methods are methods of the `Expander`, and last the table of operators. A file uses only
 //! files before it; `tests/layers.rs` holds that.
 
+mod argument;
 mod backquote;
 mod binding;
 mod body;
 mod build;
 mod call;
+mod check;
 mod chunk;
 mod control;
 mod define;
 mod destructure;
+mod directive;
 mod ending;
 mod expander;
 mod failure;
@@ -104,9 +108,12 @@ mod scope;
 mod setf;
 mod standard_place;
 mod toplevel;
+mod trap;
+mod unit;
 mod values;
 mod variable;
 
 pub use chunk::{Chunk, Purpose};
 pub use expander::{Expander, Stop};
 pub use failure::{FailurePlace, MacroFailure};
+pub use unit::UnitFindings;

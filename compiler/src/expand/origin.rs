@@ -3,6 +3,7 @@
 //! Everything that a macro makes has the place of its call. So the author of the program wrote a form if the
 //! place of the form is known and differs from that of the call that made it ([`Origins::written`]).
 
+use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
@@ -26,6 +27,10 @@ pub(super) struct Origin {
     pub(super) name: Symbol,
     /// Place of the call.
     pub(super) span: Span,
+    /// The call as written; `None` for a symbol macro.
+    form: Option<Datum>,
+    /// The call that made this one.
+    around: Option<OriginId>,
     /// Whether the macro belongs to the language, so that an error in its expansion is not its fault.
     pub(super) is_standard: bool,
     /// Whether the macro of the innermost of these calls belongs to the language.
@@ -59,6 +64,29 @@ impl Origins {
         &self.calls[index as usize]
     }
 
+    /// Returns the place within `extent` at which `symbol` is written in a call, or in those around it:
+    /// what a macro passes on keeps its place, but for symbols.
+    pub(super) fn place_of(&self, symbol: &Symbol, extent: Span, origin: OriginId) -> Option<Span> {
+        let mut at = Some(origin);
+        while let Some(id) = at {
+            let call = self.get(id);
+            let mut pending: Vec<&Datum> = call.form.iter().collect();
+            while let Some(datum) = pending.pop() {
+                if datum.as_symbol() == Some(symbol)
+                    && is_known(datum.span())
+                    && extent.contains(datum.span())
+                {
+                    return Some(datum.span());
+                }
+                if let Some((car, cdr)) = datum.as_cons() {
+                    pending.extend([cdr, car]);
+                }
+            }
+            at = call.around;
+        }
+        None
+    }
+
     /// Notes a call of the macro `operator` at `span`, in a form that the call `around` made.
     ///
     /// # Errors
@@ -67,6 +95,7 @@ impl Origins {
         &mut self,
         operator: &Symbol,
         span: Span,
+        form: Option<&Datum>,
         is_standard: bool,
         around: Option<OriginId>,
     ) -> Checked<Option<OriginId>> {
@@ -87,7 +116,10 @@ impl Origins {
         let origin = match parent {
             // A call that a macro has made is shown as the call of that macro.
             Some(parent) if parent.span == span => Origin { is_made_by_standard, chain, ..parent.clone() },
-            _ => Origin { name: operator.clone(), span, is_standard, is_made_by_standard, chain },
+            _ => {
+                let (name, form) = (operator.clone(), form.cloned());
+                Origin { name, span, form, around, is_standard, is_made_by_standard, chain }
+            }
         };
         self.expansions += 1;
         self.calls.push(origin);

@@ -71,7 +71,7 @@ impl Expander {
         let make = Make(to.span);
         match self.meaning(environment, symbol, to.span)? {
             Some(Meaning::Variable(VariableMeaning::SymbolMacro(form))) => {
-                let origin = self.enter_origin(symbol, to.span, true, to.origin)?;
+                let origin = self.enter_origin(symbol, to.span, None, true, to.origin)?;
                 self.schedule([Job::Place(form, To { origin, ..to })]);
             }
             Some(Meaning::Constant(_)) => {

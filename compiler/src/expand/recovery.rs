@@ -65,7 +65,9 @@ pub(super) fn clause(expander: &mut Expander, _: &mut dyn Environment, form: For
 pub(super) fn cause(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(2..=usize::MAX, "needs a cause and a datum that says where it is")?;
     if let Some(cause) = form.args[0].as_symbol() {
-        expander.globals.note_cause(cause, form.at(form.args[1].span()));
+        let around = form.at(form.args[1].span());
+        let written = to.origin.and_then(|origin| expander.origins.place_of(cause, around, origin));
+        expander.globals.note_cause(cause, written.unwrap_or(around));
     }
     let jobs = expander.body(form.args[2..].to_vec(), to);
     expander.schedule(jobs);

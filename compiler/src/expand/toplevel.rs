@@ -7,7 +7,7 @@
 //! A form given to `eval` is treated likewise, except that each of its top-level forms is evaluated before
 //! the next one is expanded. The last one is left to the caller, who wants its value.
 
-use esl_bytecode::compile::{Environment, MacroRef};
+use esl_bytecode::compile::{Environment, GlobalFunction, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::CL_PACKAGE;
 
@@ -65,6 +65,9 @@ impl Expander {
         }
         if !self.is_operator(&form.operator) {
             let global = environment.global(&form.operator);
+            if global.locked && global.function == GlobalFunction::Macro {
+                self.check_written(environment, &form, top.origin);
+            }
             let is_macro = self.is_macro(environment, &form.operator);
             if is_macro && !self.globals.is_broken_macro(&form.operator) {
                 return self.stop_for_top(MacroRef::Global(form.operator.clone()), &form, global.locked, top);

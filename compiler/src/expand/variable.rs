@@ -7,10 +7,11 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, fresh, is_known, name};
+use super::form::{Checked, Form, Make, fresh, is_known, name, on_one_line, plain};
+use super::global::{NameUsed, PendingVariable};
 use super::job::{Job, To};
 use super::origin::OriginId;
-use super::scope::{VariableMeaning, Visible, global_symbol_macro};
+use super::scope::{ScopeEntry, VariableMeaning, Visible, global_symbol_macro};
 use crate::core::NodeKind;
 use crate::diagnostic::code;
 
@@ -73,7 +74,7 @@ impl Expander {
             }
             Some(Meaning::Variable(VariableMeaning::Special)) => NodeKind::Special(symbol.clone()),
             Some(Meaning::Variable(VariableMeaning::SymbolMacro(form))) => {
-                let origin = self.enter_origin(symbol, to.span, true, to.origin)?;
+                let origin = self.enter_origin(symbol, to.span, None, true, to.origin)?;
                 self.schedule([Job::Expand(form, To { origin, ..to })]);
                 return Ok(());
             }
@@ -89,7 +90,7 @@ impl Expander {
                 _ => NodeKind::Special(symbol.clone()),
             },
             None => {
-                self.globals.note_variable(symbol, to.span);
+                self.note_undefined(symbol, to.span, to);
                 NodeKind::Special(symbol.clone())
             }
         };
@@ -158,10 +159,42 @@ impl Expander {
     }
 }
 
+impl Expander {
+    /// Returns the place `span` of a name that is used, and the macro of the program that made the use.
+    pub(super) fn place_of_use(&self, span: Span, to: To) -> NameUsed {
+        let maker = to.origin.filter(|_| !is_known(self.origins.written(span, to.origin)));
+        let maker = maker.map(|origin| self.origins.get(origin)).filter(|origin| !origin.is_standard);
+        NameUsed { span, maker: maker.map(|origin| origin.name.clone()) }
+    }
+
+    /// Notes a use of a variable that has no definition so far.
+    fn note_undefined(&mut self, symbol: &Symbol, span: Span, to: To) {
+        let is_entry = |entry: &ScopeEntry| matches!(entry, ScopeEntry::Variable(name, ..) if name == symbol);
+        // The names of a `let` come into scope after all its values.
+        let is_bound_later =
+            self.jobs.iter().any(|job| matches!(job, Job::Enter(entries) if entries.iter().any(is_entry)));
+        let mut place = self.place_of_use(span, to);
+        // A symbol that a macro has passed on has lost its place.
+        if let Some(origin) = to.origin.filter(|_| !is_known(self.origins.written(span, to.origin)))
+            && let Some(written) = self.origins.place_of(symbol, span, origin)
+        {
+            place = NameUsed { span: written, maker: None };
+        }
+        self.globals.note_variable(PendingVariable { symbol: symbol.clone(), place, is_bound_later });
+    }
+}
+
 /// The error for a form of pairs whose last part has no value.
 pub(super) fn value_missing(form: &Form) -> Box<Diagnostic> {
     let span = form.args.last().map_or(form.head(), |last| form.at(last.span()));
-    form.fault(code::MISSING_PART, span, "needs a value after this")
+    let fault = form.fault(code::MISSING_PART, span, "needs a value after this");
+    match form.args.as_slice() {
+        [place, equals, value] if equals.as_symbol().is_some_and(|symbol| symbol.name() == "=") => {
+            let (place, value) = (on_one_line(place, 20), on_one_line(value, 20));
+            Box::new(fault.help(format!("write `({} {place} {value})`", plain(&form.operator))))
+        }
+        _ => fault,
+    }
 }
 
 /// `(setq {name form}*)`
@@ -197,7 +230,7 @@ pub(super) fn setq(
         }
         meaning => {
             if meaning.is_none() {
-                expander.globals.note_variable(&symbol, form.at(form.args[0].span()));
+                expander.note_undefined(&symbol, form.at(form.args[0].span()), to);
             }
             expander.fill(to, NodeKind::SetSpecial(symbol, value));
         }

@@ -1,6 +1,6 @@
 //! Reading without a program: for tests, fuzzing and tools.
 
-use esl_bytecode::compile::{Environment, Global, GlobalFunction, InternError};
+use esl_bytecode::compile::{Environment, Global, GlobalFunction, InternError, NameUse};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::span::SourceId;
@@ -50,7 +50,7 @@ impl Environment for BareEnvironment {
         self.uninterned
     }
 
-    fn similar(&self, _: &Symbol, _: bool) -> Vec<Symbol> {
+    fn similar(&self, _: &Symbol, _: NameUse) -> Vec<Symbol> {
         Vec::new()
     }
 }

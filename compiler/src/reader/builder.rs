@@ -7,7 +7,7 @@
 
 use std::sync::{Arc, LazyLock};
 
-use esl_bytecode::compile::{Environment, InternError};
+use esl_bytecode::compile::{Environment, InternError, NameUse};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::{SourceId, Span};
@@ -201,7 +201,7 @@ impl<'a> DatumBuilder<'a> {
                 let message = format!("the package `{prefix}` has no symbol `{}`", shorten(name));
                 let mut diagnostic = code::NOT_EXTERNAL.at(span, message);
                 let wanted = Symbol::new(&prefix.into(), name);
-                if let Some(similar) = self.environment.similar(&wanted, false).first() {
+                if let Some(similar) = self.environment.similar(&wanted, NameUse::Function).first() {
                     diagnostic = diagnostic.help(format!("did you mean `{}`?", similar.name()));
                 }
                 self.fail(diagnostic)
@@ -346,7 +346,12 @@ impl<'a> DatumBuilder<'a> {
     pub(super) fn unknown(&mut self, start: u32, end: u32) -> Datum {
         let message =
             format!("expected a character that has a meaning after `#`, found `{}`", self.slice(start, end));
-        self.fail(code::INVALID_TOKEN.at(self.span(start, end), message))
+        let fault = code::INVALID_TOKEN.at(self.span(start, end), message);
+        match self.slice(start, end) {
+            "#t" | "#T" => self.fail(fault.help("write `t` for true")),
+            "#f" | "#F" => self.fail(fault.help("write `nil` for false")),
+            _ => self.fail(fault),
+        }
     }
 
     /// Returns the list of a mark's symbol and `datum`. The mark ends before `middle`.

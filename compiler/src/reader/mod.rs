@@ -31,6 +31,7 @@ use esl_bytecode::span::{SourceId, Span};
 use lalrpop_util::ParseError;
 
 use crate::diagnostic::code;
+use crate::habit::statement::{Statement, StatementKind, statement};
 
 pub use bare::{BareEnvironment, read_anything};
 pub use character::CHARACTER_NAMES;
@@ -61,6 +62,8 @@ pub struct Reader {
     /// Diagnostics to be returned before reading continues, the first one last.
     waiting: Vec<Diagnostic>,
     errors: usize,
+    /// Kinds of foreign statements that have been reported.
+    foreign: Vec<StatementKind>,
 }
 
 impl Reader {
@@ -73,7 +76,8 @@ impl Reader {
         if !is_readable(&text) {
             waiting.push(too_large(source));
         }
-        Reader { text, position, scanner: Scanner::new(source), room: MAX_FILL, waiting, errors: 0 }
+        let scanner = Scanner::of_program(source);
+        Reader { text, position, scanner, room: MAX_FILL, waiting, errors: 0, foreign: Vec::new() }
     }
 
     /// Returns whether no diagnostics about what was read are left.
@@ -119,6 +123,9 @@ impl Reader {
             if !is_readable(&self.text) {
                 return None;
             }
+            self.pass_statements();
+        }
+        if self.waiting.is_empty() {
             match read(&mut self.scanner, environment, &self.text, self.position, &mut self.room) {
                 ReadStep::Datum(datum, end) => {
                     self.position = end;
@@ -142,6 +149,41 @@ impl Reader {
             self.position = self.text.len();
         }
         Some(Err(Box::new(error)))
+    }
+}
+
+impl Reader {
+    /// Leaves out statements of other languages before the next datum. The first of each kind is reported.
+    fn pass_statements(&mut self) {
+        while self.waiting.is_empty()
+            && let Some(found) = self.statement()
+        {
+            self.position = found.end;
+            let is_known = match found.kind {
+                StatementKind::Comment => std::mem::replace(&mut self.scanner.has_foreign_comment, true),
+                kind => self.foreign.contains(&kind),
+            };
+            if !is_known {
+                self.foreign.push(found.kind);
+                let end = u32::try_from(found.line_end).unwrap_or(u32::MAX);
+                let span = Span::new(self.scanner.source(), found.start as u32, end);
+                self.waiting.push(code::FOREIGN_NOTATION.at(span, found.message).help(found.help));
+            }
+        }
+    }
+
+    /// Returns the statement of another language that comes next, if one does.
+    fn statement(&self) -> Option<Statement> {
+        let mut at = self.position;
+        loop {
+            let rest = &self.text[at..];
+            at += rest.len() - rest.trim_start().len();
+            if !self.text[at..].starts_with(';') {
+                break;
+            }
+            at += self.text[at..].find('\n').unwrap_or(self.text.len() - at);
+        }
+        if self.text[at..].starts_with('(') { None } else { statement(&self.text, at) }
     }
 }
 

@@ -8,11 +8,12 @@ use esl_bytecode::module::{Constant, Module};
 use esl_bytecode::span::{SourceId, Span};
 
 use super::calls::FormCalls;
+use super::cascade::without_consequences;
 use super::queue::{FormQueue, Next, renumber_uninterned};
 use crate::cover::{CountedPlace, cover};
-use crate::diagnostic::{Renderer, Sources, code};
+use crate::diagnostic::{Renderer, Sources, Stage, code};
 use crate::expand::print::print;
-use crate::expand::{Chunk, Expander, FailurePlace, MacroFailure, Purpose, Stop};
+use crate::expand::{Chunk, Expander, FailurePlace, MacroFailure, Purpose, Stop, UnitFindings};
 use crate::lower::{Lowering, SourceLines};
 use crate::reader::datum_end;
 
@@ -228,6 +229,8 @@ impl CompilationState {
             StepOutcome::Failed(failure) => {
                 let message = format!("the module `{name}` is not available: {}", failure.report);
                 self.diagnostics.push(code::UNKNOWN_MODULE.at(span, message));
+                // What the module defines may be used in all forms after it.
+                queue.leave_out_forms();
             }
             _ => queue.add_call(name, span),
         }
@@ -340,24 +343,38 @@ impl CompilationState {
             };
             last.help.get_or_insert(help.into());
         }
-        self.end()
+        self.end(Vec::new())
     }
 
     /// Ends the compilation at the end of its texts.
     fn finish(&mut self, environment: &mut dyn Environment) -> Step {
-        self.diagnostics.extend(self.expander.finish(environment));
-        self.end()
+        let is_partial = |diagnostic: &Diagnostic| {
+            diagnostic.severity == Severity::Error
+                && ([code::UNKNOWN_MODULE, code::READ_TIME_FAILURE]
+                    .iter()
+                    .any(|lost| lost.name == diagnostic.code)
+                    || code::find(diagnostic.code).is_some_and(|code| code.stage == Stage::Reader))
+        };
+        let is_whole = !self.diagnostics.iter().any(is_partial);
+        let UnitFindings { diagnostics, foreign } = self.expander.finish(environment, is_whole);
+        self.diagnostics.extend(diagnostics);
+        self.end(foreign)
     }
 
-    fn end(&mut self) -> Step {
+    /// Ends the compilation. Findings that follow from `foreign` forms are left out.
+    fn end(&mut self, mut foreign: Vec<Span>) -> Step {
         let mut diagnostics = std::mem::take(&mut self.diagnostics);
+        for diagnostic in &mut diagnostics {
+            self.renumber(diagnostic);
+        }
+        for span in &mut foreign {
+            span.source.0 += self.source.0;
+        }
+        let mut diagnostics = without_consequences(diagnostics, foreign, &self.sources);
         diagnostics.sort_by_key(|diagnostic| {
             let span = diagnostic.primary.span;
             (span.source, span.start, span.end)
         });
-        for diagnostic in &mut diagnostics {
-            self.renumber(diagnostic);
-        }
         let has_failed = diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error);
         let mut module = (!has_failed).then(|| match std::mem::take(&mut self.chunks) {
             // Joining takes as long as making.

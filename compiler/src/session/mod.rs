@@ -12,6 +12,7 @@
 //! [`esl_bytecode::compile`].
 
 mod calls;
+mod cascade;
 mod compilation;
 mod queue;
 

@@ -82,6 +82,8 @@ pub(super) struct FormQueue {
     errors_before_package: Option<usize>,
     /// Bytes of the text that the program is given to read one form; 0 for [`READ_PART`].
     read_part: usize,
+    /// Whether forms other than `require` are left out, since a module is missing that they may need.
+    leaves_out_forms: bool,
 }
 
 /// Bytes of a text that the program is given to read one form from, at first; twice as many whenever the form
@@ -178,6 +180,11 @@ impl FormQueue {
         span
     }
 
+    /// Leaves out all forms from here on, except those that require modules.
+    pub(super) fn leave_out_forms(&mut self) {
+        self.leaves_out_forms = true;
+    }
+
     /// Takes the modules that the texts themselves require.
     pub(super) fn take_apart(&mut self) -> Vec<String> {
         std::mem::take(&mut self.apart)
@@ -253,8 +260,10 @@ impl FormQueue {
                     None => {
                         self.row.pop_front();
                     }
-                    Some(Err(diagnostic)) => diagnostics.push(*diagnostic),
-                    Some(Ok(form)) if form.has_calls() => return Next::Calls(form),
+                    // The missing module may define the package.
+                    Some(Err(fault)) if self.leaves_out_forms && is_about_names(fault.code) => {}
+                    Some(Err(fault)) => diagnostics.push(*fault),
+                    Some(Ok(form)) if form.has_calls() && !self.leaves_out_forms => return Next::Calls(form),
                     Some(Ok(form)) => {
                         if let Some(next) = self.begin(form, expander, diagnostics) {
                             return next;
@@ -285,12 +294,19 @@ impl FormQueue {
             if self.required.insert(key) {
                 return Some(Next::Require(name, form.span()));
             }
+        } else if self.leaves_out_forms {
+            return None;
         } else {
             self.errors_before_package = is_about_package(&form).then(|| expander.errors());
         }
         expander.begin_file_form(form);
         Some(Next::Form)
     }
+}
+
+/// Whether a diagnostic of this code is about a package, or about a name in one.
+fn is_about_names(code: &str) -> bool {
+    [code::UNKNOWN_PACKAGE, code::NOT_EXTERNAL].iter().any(|about| about.name == code)
 }
 
 /// Whether a form makes a package or enters one.

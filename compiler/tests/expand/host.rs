@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use esl_bytecode::compile::{
     Accessor, Arity, CompileTimeFailure, CompileTimeHost, Environment, Global, GlobalFunction,
-    GlobalVariable, InternError, MacroCall, MacroRef, SourcePlace,
+    GlobalVariable, InternError, MacroCall, MacroRef, NameUse, SourcePlace,
 };
 use esl_bytecode::datum::{Datum, ObjectId};
 use esl_bytecode::module::{Constant, Module};
@@ -192,12 +192,13 @@ impl Environment for FakeHost {
         self.bare.fresh()
     }
 
-    fn similar(&self, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
+    fn similar(&self, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol> {
         let is_like = |other: &&Symbol| {
             let global = &self.globals[*other];
-            let is_defined = match variable {
-                true => !matches!(global.variable, GlobalVariable::Undefined),
-                false => global.function != GlobalFunction::Undefined,
+            let is_defined = match wanted {
+                NameUse::Variable => !matches!(global.variable, GlobalVariable::Undefined),
+                NameUse::Function => global.function != GlobalFunction::Undefined,
+                NameUse::Cause => false,
             };
             is_defined && *other != symbol && other.name().get(..2) == symbol.name().get(..2)
         };

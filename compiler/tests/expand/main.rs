@@ -67,7 +67,7 @@ fn expand_file(host: &mut FakeHost, text: &str) -> (Vec<Chunk>, Vec<Diagnostic>)
     let mut expander = Expander::new();
     let forms = read_all(host, text);
     let chunks = forms.into_iter().flat_map(|form| expand_form(&mut expander, host, form)).collect();
-    (chunks, expander.finish(host))
+    (chunks, expander.finish(host, true).diagnostics)
 }
 
 /// Each line of a text expanded by itself, with the codes of what was found.

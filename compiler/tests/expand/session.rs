@@ -32,13 +32,9 @@ fn errors_of_all_phases_are_reported_in_the_order_of_the_text() {
     let (module, found) = drive(&mut *compilation, &mut FakeHost::new());
     assert!(module.is_none());
     let codes: Vec<&str> = found.iter().map(|finding| finding.code).collect();
-    let expected = [
-        "malformed-binding",
-        "comma-outside-backquote",
-        "undefined-function",
-        "wrong-argument-count",
-        "unexpected-close",
-    ];
+    // Names are not looked for in a text that could not be read as a whole.
+    let expected =
+        ["malformed-binding", "comma-outside-backquote", "wrong-argument-count", "unexpected-close"];
     assert_eq!(codes, expected);
     assert!(found.iter().all(|finding| finding.primary.span.source == SourceId(3)));
     let shown = compilation.render(&found[0]);
@@ -153,7 +149,7 @@ fn a_program_can_be_shown_with_its_macros_expanded() {
 
 #[test]
 fn a_failure_of_a_macro_shows_the_line_inside_it_after_the_call() {
-    let text = "(defmacro failing (form)\n  (list form\n        (car 5)))\n(list 1\n  (failing\n    2))";
+    let text = "(defmacro failing (form)\n  (list form\n        (car ())))\n(list 1\n  (failing\n    2))";
     let mut host = FakeHost::new();
     host.failing_place = Some(SourcePlace { source: "test.esl".into(), line: 3, column: 9 });
     let mut compilation = Compiler::for_source(SourceId(2)).compile_text("test.esl", text);
@@ -163,8 +159,8 @@ fn a_failure_of_a_macro_shows_the_line_inside_it_after_the_call() {
 error[macro-failed]: `failing` failed while it was expanded: it did not work
  --> test.esl:5:4
   |
-3 |         (car 5)))
-  |         ------- it failed here
+3 |         (car ())))
+  |         -------- it failed here
 4 | (list 1
 5 |   (failing
   |    ^^^^^^^";

@@ -146,7 +146,7 @@ fn a_text_may_begin_with_a_byte_order_mark_and_a_line_for_the_shell() {
     check_one("#!/usr/bin/env -S eslvm run\na", "A");
     check_one("\u{feff}#! x (\r\na", "A");
     assert_eq!(read_all("#!only").len(), 0);
-    assert_eq!(codes("a\n#!b"), ["invalid-token"]);
+    assert_eq!(codes("a\n#!b"), ["foreign-notation"]);
 }
 
 #[test]

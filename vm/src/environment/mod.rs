@@ -8,7 +8,7 @@
 
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::compile::{
-    Accessor, Arity, Environment, Global, GlobalFunction, GlobalVariable, InternError,
+    Accessor, Arity, Environment, Global, GlobalFunction, GlobalVariable, InternError, NameUse, Signature,
 };
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
 use esl_bytecode::module::Parameters;
@@ -26,6 +26,7 @@ use crate::world::{World, find_builtin};
 
 mod host;
 mod package;
+mod signature;
 mod similar;
 
 /// Items of `*features*` that are looked at: the list may be circular.
@@ -108,8 +109,12 @@ impl Environment for Vm {
         self.world.fresh()
     }
 
-    fn similar(&self, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
-        similar::similar(self, symbol, variable)
+    fn similar(&self, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol> {
+        similar::similar(self, symbol, wanted)
+    }
+
+    fn signature(&self, cell: &Symbol) -> Option<Signature> {
+        signature::signature(self, cell)
     }
 }
 

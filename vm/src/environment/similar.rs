@@ -1,6 +1,7 @@
 //! Suggestions for misspelt names.
 
 use esl_bytecode::builtin::BUILTINS;
+use esl_bytecode::compile::NameUse;
 use esl_bytecode::package::{PackageId, Qualifier};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
@@ -12,7 +13,7 @@ use crate::vm::Vm;
 const MOST: usize = 3;
 
 /// Returns defined names similar to `symbol`, the likeliest first.
-pub(super) fn similar(vm: &Vm, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
+pub(super) fn similar(vm: &Vm, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol> {
     let limit = match symbol.name().chars().count() {
         0..=2 => 0,
         3..=5 => 1,
@@ -39,11 +40,12 @@ pub(super) fn similar(vm: &Vm, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
         }
     };
     vm.world.each_symbol(&mut |candidate, value| {
-        if is_visible(candidate, symbol) && is_defined(vm, value, variable) {
+        let is_likely = wanted == NameUse::Cause || is_visible(candidate, symbol);
+        if is_likely && is_defined(vm, value, wanted) {
             consider(candidate);
         }
     });
-    if !variable {
+    if wanted == NameUse::Function {
         for info in BUILTINS {
             consider(&Symbol::new(&info.package().into(), info.name));
         }
@@ -66,14 +68,22 @@ fn is_visible(candidate: &Symbol, symbol: &Symbol) -> bool {
     }
 }
 
-fn is_defined(vm: &Vm, value: Value, variable: bool) -> bool {
+fn is_defined(vm: &Vm, value: Value, wanted: NameUse) -> bool {
     let Some(object) = vm.world.object_of(&vm.heap, value) else { return false };
-    if !variable {
-        return vm.world.function_of(&vm.heap, object).is_some()
-            || vm.world.macro_function_of(&vm.heap, object).is_some();
+    match wanted {
+        NameUse::Function => {
+            vm.world.function_of(&vm.heap, object).is_some()
+                || vm.world.macro_function_of(&vm.heap, object).is_some()
+        }
+        NameUse::Variable => {
+            let flags = vm.heap.symbol(object).map_or(0, |cell| cell.header.flags);
+            flags & (SymbolObject::SPECIAL | SymbolObject::CONSTANT) != 0
+        }
+        // The library notes parents, or the condition type, of a cause.
+        NameUse::Cause => super::value_for(vm, &Symbol::esl("%CAUSE"))
+            .and_then(|indicator| super::property(&vm.heap, object, indicator))
+            .is_some_and(Value::is_true),
     }
-    let flags = vm.heap.symbol(object).map_or(0, |cell| cell.header.flags);
-    flags & (SymbolObject::SPECIAL | SymbolObject::CONSTANT) != 0
 }
 
 /// Returns the number of characters to insert, delete, replace or swap with their neighbour to turn `a` into

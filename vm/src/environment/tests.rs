@@ -1,7 +1,7 @@
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{
-    Compilation, Compile, CompileTimeHost, MacroCall, MacroRef, Part, Step, StepOutcome, Work,
+    Compilation, Compile, CompileTimeHost, MacroCall, MacroRef, NameUse, Part, Step, StepOutcome, Work,
 };
 use esl_bytecode::datum::DatumKind;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
@@ -106,11 +106,11 @@ fn a_compiler_learns_what_names_mean() {
         let car = vm.global(&Symbol::cl("CAR")).function;
         assert_eq!(car, GlobalFunction::Function(Some(Arity { min: 1, max: Some(1) })));
         assert!(matches!(vm.setf_function(&Symbol::cl("CAR")), GlobalFunction::Undefined));
-        assert_eq!(vm.similar(&Symbol::esl("QUOTTED"), false), [Symbol::esl("QUOTED")]);
+        assert_eq!(vm.similar(&Symbol::esl("QUOTTED"), NameUse::Function), [Symbol::esl("QUOTED")]);
         let foreign = Symbol::new(&esl_bytecode::symbol::USER_PACKAGE.into(), "QUOTTED");
-        assert_eq!(vm.similar(&foreign, false), [], "a program cannot use an internal name");
+        assert_eq!(vm.similar(&foreign, NameUse::Function), [], "a program cannot use an internal name");
         assert_eq!(
-            vm.similar(&Symbol::esl("LIMITS"), true).len(),
+            vm.similar(&Symbol::esl("LIMITS"), NameUse::Variable).len(),
             usize::from(vm.world.find(&Symbol::esl("LIMIT")).is_some())
         );
     }

@@ -15,6 +15,13 @@ impl Scanner {
             return;
         }
         let span = self.span(start, end);
+        if self.backquotes == 0 && self.is_between_parts(start) {
+            if !std::mem::replace(&mut self.has_foreign_comma, true) {
+                let message = "blanks separate the parts of a form in ESL, not commas";
+                self.error(code::FOREIGN_NOTATION.at(span, message).help("leave out the commas"));
+            }
+            return;
+        }
         if self.backquotes == 0 {
             let in_array = self.levels.iter().any(|level| level.open == OpenKind::Array);
             let place = if in_array { "in an array literal" } else { "outside of a backquote" };

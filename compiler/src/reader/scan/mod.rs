@@ -10,6 +10,7 @@
 //! times. Not here: dots, marks without a datum (the grammar), the meaning of tokens (`builder`).
 
 mod check;
+mod habits;
 mod recover;
 
 use esl_bytecode::diagnostic::Diagnostic;
@@ -121,6 +122,12 @@ pub(super) struct Scanner {
     /// Lists that are known to be unclosed at the end of the text, in order.
     unclosed: Vec<Unclosed>,
     runaways: u32,
+    /// Whether the text is a program, in which habits from other languages are faults.
+    is_program: bool,
+    /// Whether a comment that begins with `#` or the like has been reported.
+    pub(super) has_foreign_comment: bool,
+    /// Whether a comma between the parts of a form of this datum has been reported.
+    has_foreign_comma: bool,
 }
 
 impl Scanner {
@@ -130,6 +137,11 @@ impl Scanner {
 
     pub(super) fn new(source: SourceId) -> Scanner {
         Scanner { source, ..Scanner::default() }
+    }
+
+    /// Creates a scanner for the text of a program.
+    pub(super) fn of_program(source: SourceId) -> Scanner {
+        Scanner { is_program: true, ..Scanner::new(source) }
     }
 
     /// Collects the tokens of the next datum of `text` from byte `from` on.
@@ -168,6 +180,16 @@ impl Scanner {
                     self.stray(text, start, end);
                     false
                 }
+                Token::UnknownDispatch if self.is_foreign_comment(text, start, end) => {
+                    let line = text[end as usize..].find('\n').unwrap_or(text.len() - end as usize);
+                    self.foreign_comment(start, end + line as u32);
+                    lexer.bump(line);
+                    false
+                }
+                Token::Quote if self.is_end_of_text(text, start, end) => {
+                    self.foreign_text(text, end);
+                    false
+                }
                 token => self.token(token, text, start, end, has_feature),
             };
             if is_done {
@@ -193,6 +215,7 @@ impl Scanner {
         self.labels.clear();
         self.deepest = 0;
         self.tokens = 0;
+        self.has_foreign_comma = false;
     }
 
     /// Takes a token other than a parenthesis. Returns whether it completes the top-level datum.

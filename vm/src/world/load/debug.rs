@@ -175,7 +175,7 @@ pub(super) fn entry_at(entries: impl Iterator<Item = LineEntry>, pc: u32) -> Opt
 }
 
 /// Returns lambda list and documentation, from a debug record.
-pub(super) fn texts(heap: &Heap, debug: Value) -> Option<(Value, Value)> {
+pub(crate) fn texts(heap: &Heap, debug: Value) -> Option<(Value, Value)> {
     let record = heap.record(debug, Kind::Record)?;
     Some((record[LAMBDA_LIST], record[DOCUMENTATION]))
 }

@@ -40,6 +40,7 @@ mod definitions;
 mod image;
 mod prepare;
 
+pub(crate) use debug::texts as debug_texts;
 pub(crate) use definitions::ImageClass;
 pub use esl_bytecode::compile::SourcePlace;
 pub(crate) use image::{

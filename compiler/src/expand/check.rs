@@ -1,0 +1,225 @@
+//! Checks of forms as they are written, before macros of the library take them apart: format directives
+//! against arguments, forms without a body, tests given to `assert`, and the arguments of failures and of
+//! their procedures.
+//!
+//! Only names of the language are checked, so what they mean is known. A form that a macro of the library
+//! makes is not checked.
+
+use std::sync::LazyLock;
+
+use esl_bytecode::compile::Environment;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::{CL_PACKAGE, Symbol};
+use rustc_hash::FxHashMap;
+
+use super::argument::usage;
+use super::directive::arguments_of;
+use super::expander::Expander;
+use super::form::{Form, is_known, name, on_one_line, operator};
+use super::global::CauseArguments;
+use super::origin::OriginId;
+use super::trap::traps;
+use crate::diagnostic::code;
+
+/// A check of a form.
+type FormCheck = fn(&mut Expander, &dyn Environment, &Form, Option<OriginId>);
+
+static CHECKS: LazyLock<FxHashMap<Symbol, FormCheck>> = LazyLock::new(|| {
+    let standard: &[(&str, FormCheck)] = &[
+        ("CASE", case),
+        ("ECASE", case),
+        ("CERROR", |expander, _, form, origin| expander.directives(form, 1, origin)),
+        ("ERROR", |expander, _, form, origin| expander.directives(form, 0, origin)),
+        ("WARN", |expander, _, form, origin| expander.directives(form, 0, origin)),
+        ("FORMAT", format),
+        ("HANDLER-BIND", guard),
+        ("HANDLER-CASE", guard),
+        ("IGNORE-ERRORS", guard),
+        ("RESTART-CASE", guard),
+    ];
+    let own: &[(&str, FormCheck)] = &[
+        ("ASSERT", assert),
+        ("DEFINE-MOCK", operation),
+        ("FAIL", fail),
+        ("START", operation),
+        ("WITH-RECOVERY-PROCEDURES", recovery),
+        ("WITH-CLEANUP-PROCEDURE", body),
+        ("WITH-BUDGET", body),
+        ("WITH-GUARDIAN", body),
+        ("WITH-MAINTAINED-PROPERTIES", body),
+        ("WITH-MAINTAINED-PROPERTY", body),
+        ("WITH-QUOTA", body),
+        ("WITH-RESOURCE", body),
+        ("WITH-RESOURCES", body),
+        ("WITH-RIGHTS", body),
+        ("WITH-SUSPENSION-PROCEDURES", body),
+        ("WITH-TIMEOUT", body),
+        ("WITHOUT-INTERRUPTS", body),
+    ];
+    let standard = standard.iter().map(|&(name, check)| (Symbol::cl(name), check));
+    let own = own.iter().map(|&(name, check)| (Symbol::esl(name), check));
+    standard.chain(own).collect()
+});
+
+/// Functions whose values are tests, beside those whose names end in `P`.
+const TESTS: &[&str] =
+    &["=", "/=", "<", ">", "<=", ">=", "EQ", "EQL", "EQUAL", "EQUALP", "NOT", "NULL", "STRING="];
+
+impl Expander {
+    /// Checks a form of the language as it is written.
+    pub(super) fn check_written(
+        &mut self,
+        environment: &dyn Environment,
+        form: &Form,
+        origin: Option<OriginId>,
+    ) {
+        let Some(check) = CHECKS.get(&form.operator) else { return };
+        // What a macro of the program makes may handle the failures of forms inside its call.
+        if is_known(self.origins.written(form.span, origin)) || !self.origins.is_of_library(form.span, origin)
+        {
+            check(self, environment, form, origin);
+        }
+    }
+
+    /// Whether a form that handles failures is around `span`.
+    pub(super) fn is_guarded(&self, span: Span) -> bool {
+        self.guards.iter().any(|guard| guard.contains(span))
+    }
+
+    /// Checks a control string, the part `at` of a form, against the arguments after it.
+    fn directives(&mut self, form: &Form, at: usize, origin: Option<OriginId>) {
+        let Some(DatumKind::String(control)) = form.args.get(at).map(Datum::kind) else { return };
+        let Some(takes) = arguments_of(control) else { return };
+        let given = form.args.len() - at - 1;
+        if given >= takes.min && takes.max.is_none_or(|max| given <= max) || self.is_guarded(form.span) {
+            return;
+        }
+        let count = |count: usize| match count {
+            1 => "1 argument".to_string(),
+            count => format!("{count} arguments"),
+        };
+        let wanted = match takes.max {
+            None => format!("at least {}", count(takes.min)),
+            Some(_) => count(takes.min),
+        };
+        let message = format!(
+            "the directives take {wanted}, but {given} {} given",
+            if given == 1 { "is" } else { "are" }
+        );
+        let help = match given < takes.min {
+            true => "add the missing arguments; a `~` by itself is written `~~`",
+            false => "leave out the last arguments, or add a directive such as `~a` for each",
+        };
+        self.report(code::WRONG_ARGUMENT.at(form.at(form.args[at].span()), message).help(help), origin);
+    }
+}
+
+/// `(format destination control argument*)`
+fn format(expander: &mut Expander, _: &dyn Environment, form: &Form, origin: Option<OriginId>) {
+    let Some(destination) = form.args.first() else { return };
+    // A string without a fill pointer is never a destination.
+    if let DatumKind::String(_) = destination.kind() {
+        let message = "`format` takes a destination first, not its control string";
+        let rest = form.args.iter().map(|part| on_one_line(part, 30)).collect::<Vec<_>>().join(" ");
+        let help = format!("write `(format t {rest})` to print, `(format nil {rest})` for a string");
+        let warning = code::WRONG_ARGUMENT.at(form.at(destination.span()), message);
+        if !expander.is_guarded(form.span) {
+            expander.report(warning.help(help), origin);
+        }
+        return;
+    }
+    expander.directives(form, 1, origin);
+}
+
+/// `(case key clause*)`
+fn case(expander: &mut Expander, _: &dyn Environment, form: &Form, origin: Option<OriginId>) {
+    let Some((last, others)) = form.args.split_last() else { return };
+    let is_key =
+        |clause: &Datum, names: &[&str]| operator(clause).is_some_and(|key| names.contains(&key.name()));
+    // A program about programs may have the keys `if` and `else`.
+    let is_about_words = others.iter().any(|clause| is_key(clause, &["IF", "THEN", "ELIF", "WHILE", "WHEN"]));
+    if others.len() < 2 || !is_key(last, &["ELSE", "DEFAULT"]) || is_about_words {
+        return;
+    }
+    let key = operator(last).map(|key| key.name().to_lowercase()).unwrap_or_default();
+    let message = format!("this clause is for the symbol `{key}`, not for all other values");
+    expander.report(
+        code::FOREIGN_WORD.at(form.at(last.span()), message).help("write `(t …)` or `(otherwise …)`"),
+        origin,
+    );
+}
+
+/// `(assert fact)`
+fn assert(expander: &mut Expander, _: &dyn Environment, form: &Form, origin: Option<OriginId>) {
+    let Some(head) = form.args.first().and_then(operator) else { return };
+    let test = head.name();
+    let is_test = TESTS.contains(&test) || test.len() > 3 && test.ends_with('P');
+    if !head.is_in(CL_PACKAGE) || !is_test {
+        return;
+    }
+    let message = "`assert` adds a fact to the database in ESL, and this is a test";
+    let written = on_one_line(&form.args[0], 40);
+    let help = format!("write `(cl:assert {written})` to check it");
+    expander.report(code::WRONG_ARGUMENT.at(form.at(form.args[0].span()), message).help(help), origin);
+}
+
+/// A form of the language that has a body after its required parts.
+fn body(expander: &mut Expander, environment: &dyn Environment, form: &Form, origin: Option<OriginId>) {
+    let Some(signature) = environment.signature(&form.operator) else { return };
+    let is_keyword = |item: &Datum| item.as_symbol().is_some_and(|symbol| symbol.name().starts_with('&'));
+    let has_whole = signature.lambda_list.elements().next().is_some_and(is_keyword);
+    let parameters = signature.lambda_list.elements().skip(if has_whole { 2 } else { 0 });
+    let required = parameters.take_while(|item| !is_keyword(item)).count();
+    if form.args.len() != required || !is_known(form.datum.span()) {
+        return;
+    }
+    let message = format!("{} has no body, so it runs nothing", name(&form.operator));
+    let help = format!("it is written {}", usage(&form.operator, &signature.lambda_list));
+    expander.report(code::MISSING_BODY.at(form.head(), message).help(help), origin);
+}
+
+/// `(fail cause argument*)`
+fn fail(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
+    let Some((cause, arguments)) = form.args.split_first() else { return };
+    if let Some(cause) = cause.as_symbol().filter(|cause| cause.is_keyword()) {
+        let given = CauseArguments { count: arguments.len() as u32, place: form.span };
+        expander.globals.note_failure(cause, given);
+    }
+}
+
+/// `(with-recovery-procedures (clause*) . body)`
+fn recovery(expander: &mut Expander, environment: &dyn Environment, form: &Form, origin: Option<OriginId>) {
+    guard(expander, environment, form, origin);
+    body(expander, environment, form, origin);
+    expander.globals.traps.extend(traps(form));
+    let Some(clauses) = form.args.first() else { return };
+    for clause in clauses.elements() {
+        let Some((head, _)) = clause.as_cons() else { continue };
+        let (cause, count) = match head.as_cons() {
+            None => (head.as_symbol(), 0),
+            Some((cause, parameters)) => {
+                let is_required =
+                    |item: &&Datum| item.as_symbol().is_some_and(|symbol| !symbol.name().starts_with('&'));
+                (cause.as_symbol(), parameters.elements().take_while(is_required).count())
+            }
+        };
+        if let Some(cause) = cause {
+            let named = CauseArguments { count: count as u32, place: form.at(head.span()) };
+            expander.globals.note_procedure(cause, named);
+        }
+    }
+}
+
+/// `(define-mock name …)` or `(start (name …))`: the name is one of an operation.
+fn operation(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
+    let Some(named) = form.args.first() else { return };
+    if let Some(symbol) = named.as_symbol().or_else(|| operator(named)) {
+        expander.globals.operations.insert(symbol.clone());
+    }
+}
+
+/// A form that handles failures.
+fn guard(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
+    expander.guards.push(form.span);
+}
