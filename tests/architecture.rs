@@ -1,5 +1,6 @@
 //! `ARCHITECTURE.md` maps the code completely and correctly: its tables list exactly the modules that exist,
-//! and each type in its glossary exists. So does each file that it and the other documents at the root name.
+//! and each type in its glossary exists. So does each file that it and the other documents at the root name, and
+//! the READMEs of the crates. Those list the public modules of their crates.
 //! The name of a type means one thing in the whole workspace. Errors have types, files are as long as one
 //! thing takes, and comments are as narrow as code.
 
@@ -54,6 +55,35 @@ fn the_map_lists_every_module() {
     for (heading, folder) in SECTIONS {
         assert_eq!(names_of_rows(section(&document, heading)), modules(&root().join(folder)), "{heading}");
     }
+}
+
+/// Crates whose README has a table of their modules.
+const CRATES_WITH_TABLES: [&str; 5] = ["bytecode", "compiler", "heap", "native", "vm"];
+
+#[test]
+fn the_readme_of_a_crate_lists_its_public_modules() {
+    for name in CRATES_WITH_TABLES {
+        let listed = names_of_rows(&read(&format!("{name}/README.md")));
+        let missing: Vec<&String> = listed.difference(&modules(&root().join(name).join("src"))).collect();
+        assert!(missing.is_empty(), "{name}/README.md lists {missing:?}");
+        let text = read(&format!("{name}/src/lib.rs"));
+        let public = text.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';'));
+        let unlisted: Vec<&str> = public.filter(|module| !listed.contains(*module)).collect();
+        assert!(!listed.is_empty() && unlisted.is_empty(), "{name}/README.md does not list {unlisted:?}");
+    }
+}
+
+#[test]
+fn the_readmes_of_the_libraries_list_their_files() {
+    let order = read("stdlib/load-order");
+    let loaded: BTreeSet<String> =
+        order.lines().filter(|line| !line.starts_with('#')).map(String::from).collect();
+    let text = read("stdlib/README.md");
+    let files = names_of_rows(section(&text, "| files | contents |"));
+    assert_eq!(files, loaded, "stdlib/README.md and stdlib/load-order");
+    let names: BTreeSet<String> =
+        modules(&root().join("world/modules")).iter().map(|name| format!(":{name}")).collect();
+    assert_eq!(names_of_rows(&read("world/README.md")), names, "world/README.md and world/modules/");
 }
 
 /// Returns the names of all types that the Rust files below `folder` declare.
@@ -330,9 +360,13 @@ fn paths_in_code(text: &str) -> Vec<&str> {
 fn each_file_that_a_document_names_exists() {
     // Paths in the story of a task are relative to the machine or the library.
     let bases = ["", "vm/src", "stdlib"];
-    for name in ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md"] {
-        let text = read(name);
-        let exists = |path: &&str| bases.iter().any(|base| root().join(base).join(path).exists());
+    let crates = CRATES_WITH_TABLES.iter().chain(&["stdlib", "world"]);
+    let readmes = crates.map(|name| format!("{name}/README.md"));
+    for name in readmes.chain(["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md"].map(String::from)) {
+        let text = read(&name);
+        let own = name.trim_end_matches(|c| c != '/');
+        let exists =
+            |path: &&str| bases.iter().chain([&own]).any(|base| root().join(base).join(path).exists());
         let missing: Vec<&str> = paths_in_code(&text).into_iter().filter(|path| !exists(path)).collect();
         assert!(missing.is_empty(), "{name} names {missing:?}");
     }
