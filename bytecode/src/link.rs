@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use num_bigint::BigInt;
 
 use crate::module::{Constant, FunctionNumber, LineEntry, Module, ModuleFunction, PoolIdx};
-use crate::symbol::{Home, Symbol};
+use crate::symbol::{Home, Symbol, setf_cell, symbol_of_setf_cell};
 
 /// Returns the module that does what `modules` do one after the other.
 ///
@@ -154,6 +154,11 @@ impl Linker {
 
     fn renumber_symbol(&mut self, symbol: &mut Symbol) {
         if let (Home::Uninterned(_), false) = (symbol.home(), self.is_one_unit) {
+            if let Some(mut named) = symbol_of_setf_cell(symbol) {
+                self.renumber_symbol(&mut named);
+                *symbol = setf_cell(&named);
+                return;
+            }
             let fresh = &mut self.fresh;
             let renumbered = self.uninterned.entry(symbol.clone()).or_insert_with_key(|symbol| {
                 *fresh += 1;

@@ -101,14 +101,28 @@ impl Symbol {
     }
 }
 
-/// Returns the symbol that keeps the global function `(setf symbol)`: one of the same package, named as it is
-/// written.
+/// Bit in the number of an uninterned symbol that keeps the function `(setf symbol)` of the one that has the
+/// rest of the number.
+const SETF_CELL: u32 = 1 << 31;
+
+/// Numbers of uninterned symbols that are no such cells.
+pub const UNINTERNED_NUMBERS: u32 = SETF_CELL - 1;
+
+/// Returns the symbol that keeps the global function `(setf symbol)`: one of the same package, or uninterned
+/// too, named as it is written.
 pub fn setf_cell(symbol: &Symbol) -> Symbol {
     let name = format!("(SETF {})", symbol.name());
     match symbol.home() {
         Home::Package(package) => Symbol::new(package, &name),
-        Home::Uninterned(id) => Symbol::uninterned(*id, &name),
+        Home::Uninterned(id) => Symbol::uninterned(*id | SETF_CELL, &name),
     }
+}
+
+/// Returns the uninterned symbol whose function `(setf symbol)` this one keeps. `None` for all others.
+pub fn symbol_of_setf_cell(cell: &Symbol) -> Option<Symbol> {
+    let Home::Uninterned(id) = *cell.home() else { return None };
+    let name = cell.name().strip_prefix("(SETF ")?.strip_suffix(')')?;
+    (id & SETF_CELL != 0).then(|| Symbol::uninterned(id & UNINTERNED_NUMBERS, name))
 }
 
 /// FNV-1a: symbols are hashed once, when they are made.

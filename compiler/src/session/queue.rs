@@ -23,7 +23,9 @@ use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::locals::Locals;
 use esl_bytecode::module::{Constant, Module};
 use esl_bytecode::span::{SourceId, Span};
-use esl_bytecode::symbol::{CL_PACKAGE, CL_USER_PACKAGE, Home, Symbol, USER_PACKAGE};
+use esl_bytecode::symbol::{
+    CL_PACKAGE, CL_USER_PACKAGE, Home, Symbol, USER_PACKAGE, setf_cell, symbol_of_setf_cell,
+};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::diagnostic::code;
@@ -373,10 +375,11 @@ pub(super) fn renumber_uninterned(module: &mut Module, environment: &mut dyn Env
         if let Constant::Symbol(symbol) | Constant::Class(symbol) = constant
             && let Home::Uninterned(_) = symbol.home()
         {
+            let named = symbol_of_setf_cell(symbol);
             let new = fresh
-                .entry(symbol.clone())
+                .entry(named.clone().unwrap_or_else(|| symbol.clone()))
                 .or_insert_with_key(|symbol| Symbol::uninterned(environment.fresh(), symbol.name()));
-            *symbol = new.clone();
+            *symbol = if named.is_some() { setf_cell(new) } else { new.clone() };
         }
     }
 }

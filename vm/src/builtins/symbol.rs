@@ -64,13 +64,19 @@ pub(crate) fn cell_of_function(vm: &mut Vm, name: Value) -> Result<Value, Exit> 
     }
     match vm.heap.as_cons(name) {
         Some(pair) if pair.car == vm.world.known.setf => {
-            let rest = vm.heap.as_cons(pair.cdr);
-            match rest.and_then(|rest| vm.world.name_of(&vm.heap, rest.car)) {
-                Some(symbol) => Ok(vm.world.intern(&mut vm.heap, &setf_cell(&symbol))?),
-                None => vm.exchange.type_error(name, "SYMBOL"),
+            let symbol = match vm.heap.as_cons(pair.cdr) {
+                Some(rest) if rest.cdr == Value::NIL => rest.car,
+                _ => {
+                    return vm.exchange.not_written(name, "(OR SYMBOL (CONS (EQL SETF) (CONS SYMBOL NULL)))");
+                }
+            };
+            if let Some(symbol) = vm.world.name_of(&vm.heap, symbol) {
+                return Ok(vm.world.intern(&mut vm.heap, &setf_cell(&symbol))?);
             }
+            let object = symbol_object(vm, symbol)?;
+            Ok(vm.world.setf_cell_object(&mut vm.heap, object)?)
         }
-        _ => vm.exchange.type_error(name, "SYMBOL"),
+        _ => vm.exchange.not_written(name, "(OR SYMBOL (CONS (EQL SETF) (CONS SYMBOL NULL)))"),
     }
 }
 

@@ -20,7 +20,7 @@ use std::fmt;
 
 use esl_bytecode::datum::{Datum, DatumKind, DatumRemains, ObjectId};
 use esl_bytecode::span::Span;
-use esl_bytecode::symbol::{Home, Symbol};
+use esl_bytecode::symbol::{Home, Symbol, symbol_of_setf_cell};
 
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
@@ -293,7 +293,13 @@ impl Unit {
         if let Some(object) = self.uninterned(id) {
             return Ok(object);
         }
-        let object = world.intern(heap, symbol)?;
+        let object = match symbol_of_setf_cell(symbol) {
+            Some(named) => {
+                let named = self.symbol_object(heap, world, &named)?;
+                world.setf_cell_object(heap, named)?
+            }
+            None => world.intern(heap, symbol)?,
+        };
         self.note_uninterned(id, object);
         Ok(object)
     }

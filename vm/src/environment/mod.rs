@@ -13,7 +13,9 @@ use esl_bytecode::compile::{
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
 use esl_bytecode::module::Parameters;
 use esl_bytecode::span::Span;
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, setf_cell};
+use esl_bytecode::symbol::{
+    CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, setf_cell, symbol_of_setf_cell,
+};
 
 pub(crate) use host::{macro_call, with_compiler};
 
@@ -179,7 +181,13 @@ pub(crate) fn property(heap: &Heap, object: Value, indicator: Value) -> Option<V
 fn value_for(vm: &Vm, symbol: &Symbol) -> Option<Value> {
     match symbol.package() {
         Some(_) => vm.world.find(symbol),
-        None => vm.compiler.unit.borrow().find_uninterned(symbol),
+        None => {
+            let unit = vm.compiler.unit.borrow();
+            unit.find_uninterned(symbol).or_else(|| {
+                let named = unit.find_uninterned(&symbol_of_setf_cell(symbol)?)?;
+                vm.world.find_setf_cell(&vm.heap, named)
+            })
+        }
     }
 }
 

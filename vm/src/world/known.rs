@@ -55,6 +55,7 @@ define_known! {
     standard_output = cl "*STANDARD-OUTPUT*";
     error_output = cl "*ERROR-OUTPUT*";
     setf = cl "SETF";
+    setf_cell = esl "%SETF-CELL";
     lambda = cl "LAMBDA";
     structure_object = cl "STRUCTURE-OBJECT";
     raise = esl "%RAISE";

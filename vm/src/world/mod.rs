@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::package::{PackageId, Packages};
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, UNINTERNED_NUMBERS};
 use indexmap::IndexMap;
 
 use crate::heap::layout::SymbolObject;
@@ -299,6 +299,39 @@ impl World {
         Ok(object)
     }
 
+    /// Returns the symbol that keeps the function `(setf symbol)` of an uninterned symbol object, if it has
+    /// been made.
+    pub(crate) fn find_setf_cell(&self, heap: &Heap, object: Value) -> Option<Value> {
+        let mut plist = heap.symbol(object)?.plist;
+        while let Some(entry) = heap.as_cons(plist) {
+            let rest = heap.as_cons(entry.cdr)?;
+            if entry.car == self.known.setf_cell {
+                return Some(rest.car);
+            }
+            plist = rest.cdr;
+        }
+        None
+    }
+
+    /// Returns the symbol that keeps the function `(setf symbol)` of an uninterned symbol object: the same one
+    /// each time, in the property list of that.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn setf_cell_object(&mut self, heap: &mut Heap, object: Value) -> Result<Value, AllocError> {
+        if let Some(cell) = self.find_setf_cell(heap, object) {
+            return Ok(cell);
+        }
+        let symbol = heap.symbol(object).copied();
+        let name = symbol.and_then(|symbol| heap.string_text(symbol.name)).unwrap_or_default();
+        let name = heap.alloc_str(&format!("(SETF {name})"))?;
+        let cell = self.make_symbol(heap, name, Value::NIL, 0)?;
+        let rest = heap.cons(cell, symbol.map_or(Value::NIL, |symbol| symbol.plist))?;
+        let plist = heap.cons(self.known.setf_cell, rest)?;
+        heap.symbol_set_plist(object, plist);
+        Ok(cell)
+    }
+
     fn make_builtin(&mut self, heap: &mut Heap, builtin: Builtin, name: Value) -> Result<Value, AllocError> {
         let number = builtin.number();
         let shape = Shape::other(Sort::Native, number as u16);
@@ -343,7 +376,7 @@ impl World {
     /// Returns a number for a fresh uninterned symbol of the compiler.
     pub(crate) fn fresh(&self) -> u32 {
         let number = self.fresh.get();
-        self.fresh.set(number.wrapping_add(1));
+        self.fresh.set(number.wrapping_add(1) & UNINTERNED_NUMBERS);
         number
     }
 

@@ -14,7 +14,7 @@ use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::file::{ConstantRecord, ModuleImage, SymbolHome};
 use esl_bytecode::module::{FunctionNumber, ModuleFunction, PoolIdx, VariablePlace};
-use esl_bytecode::symbol::Symbol;
+use esl_bytecode::symbol::{Symbol, symbol_of_setf_cell};
 use esl_heap::state::{StateSink, Stated};
 
 use super::definitions::{Definitions, ImageDefinition, name_of};
@@ -215,9 +215,29 @@ impl ImageLoader<'_> {
             }
             SymbolHome::Uninterned(id) => Symbol::uninterned(id, record.name),
         };
-        let object = self.world.intern(self.heap, &symbol)?;
+        let object = match self.number_of_named(&symbol) {
+            Some(named) => {
+                let named = self.symbol(named)?;
+                self.world.setf_cell_object(self.heap, named)?
+            }
+            None => self.world.intern(self.heap, &symbol)?,
+        };
         self.heap.own_vector_set(table, number as usize, object);
         Ok(object)
+    }
+
+    /// Returns the number of the uninterned symbol whose function `(setf symbol)` a symbol keeps. `None` for all
+    /// other symbols, and if the module does not contain that one.
+    fn number_of_named(&self, cell: &Symbol) -> Option<u32> {
+        let named = symbol_of_setf_cell(cell)?;
+        let module = self.module();
+        let at = module.symbols().position(|record| {
+            record.is_ok_and(|record| match record.home {
+                SymbolHome::Uninterned(id) => Symbol::uninterned(id, record.name) == named,
+                SymbolHome::Package(_) => false,
+            })
+        });
+        at.map(|at| at as u32)
     }
 
     /// Returns the value of a constant other than a function with captures. Data refer to earlier entries

@@ -22,7 +22,7 @@ use esl_bytecode::compile::Work;
 use esl_bytecode::file::ReadError;
 use esl_bytecode::module::{Constant, Module, ModuleFunction, PoolIdx, VariablePlace};
 use esl_bytecode::package::PackageId;
-use esl_bytecode::symbol::{Home, Symbol};
+use esl_bytecode::symbol::{Home, Symbol, symbol_of_setf_cell};
 use esl_bytecode::verify::VerifyError;
 
 use crate::fused::fuse;
@@ -307,7 +307,13 @@ impl Constants<'_> {
         if let Some(object) = self.shared.uninterned(id) {
             return Ok(object);
         }
-        let object = self.world.intern(self.heap, symbol)?;
+        let object = match symbol_of_setf_cell(symbol) {
+            Some(named) => {
+                let named = self.symbol(&named)?;
+                self.world.setf_cell_object(self.heap, named)?
+            }
+            None => self.world.intern(self.heap, symbol)?,
+        };
         self.shared.note_uninterned(id, object);
         Ok(object)
     }
