@@ -288,3 +288,42 @@ fn files_are_read_and_written_in_parts() {
     ];
     assert_eq!(lines, expected);
 }
+
+#[test]
+fn a_limit_that_ends_reading_leaves_what_has_come_to_the_next_call() {
+    // READ-SEQUENCE has put into the sequence what had come; READ and READ-LINE have taken nothing.
+    let text = "(defmacro limited (form)
+  `(print (handler-case (with-timeout 0.3 ,form) (failure (failure) (failure-cause failure)))))
+(with-open-file (s \"in\")
+  (let ((buffer (make-array 6 :initial-element '-)))
+    (limited (read-sequence buffer s))
+    (print buffer)
+    (mark \"sequence\")
+    (print (read-line s)))
+  (limited (read s))
+  (mark \"datum\")
+  (print (read s))
+  (limited (read-line s))
+  (mark \"line\")
+  (print (read-line s)))";
+    let mut running = Running::start("limited-reader", &format!("{MARK}{text}"));
+    let mut fifo = std::fs::File::options().write(true).open(running.path("in")).expect("it is there");
+    for (part, mark) in [("abc", "sequence"), ("def\n(1 2 ", "datum"), ("3) half", "line")] {
+        fifo.write_all(part.as_bytes()).expect("it is read");
+        running.await_file(mark);
+    }
+    fifo.write_all(b" a line\n").expect("it is read");
+    drop(fifo);
+    let output = running.output();
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let expected = [
+        ":TIMEOUT",
+        "#(#\\a #\\b #\\c - - -)",
+        "\"def\"",
+        ":TIMEOUT",
+        "(1 2 3)",
+        ":TIMEOUT",
+        "\" half a line\"",
+    ];
+    assert_eq!(lines, expected);
+}

@@ -39,7 +39,7 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, amount: Opt
     }
     scheduler.task_mut().extra_mut().limits.push(limit);
     if let Some(time) = time {
-        scheduler.timers.push(now.saturating_add(time), index, Due::Limit(number));
+        scheduler.set_timer(now.saturating_add(time), index, Due::Limit(number));
     }
     if amount.is_some_and(|amount| amount.measure == Measure::Ticks && amount.units == 0) {
         expire(vm, index, number, vm.world.known.budget_exhausted);

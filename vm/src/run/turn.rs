@@ -323,7 +323,7 @@ fn park_task(vm: &mut Vm, index: TaskIndex) {
         Parking::Wait(deadline) => {
             task.state = TaskState::Waiting;
             if let Some(deadline) = deadline {
-                scheduler.timers.push(deadline, index, Due::Wait(serial));
+                scheduler.set_timer(deadline, index, Due::Wait(serial));
             }
         }
         Parking::Input => {

@@ -13,7 +13,7 @@ pub(crate) struct Clock {
     pub(crate) looked_at: u64,
     /// Ticks spent when virtual time moved last.
     pub(crate) moved_at: u64,
-    /// Whether timers are due that one step had no room for.
+    /// Whether timers are due: one step had no room for them, or their time had come when they were set.
     pub(crate) more_is_due: bool,
     /// Nanoseconds in which all tasks waited.
     pub(crate) idled: u64,

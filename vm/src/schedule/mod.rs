@@ -373,6 +373,13 @@ impl Scheduler {
         self.writers.dedup();
     }
 
+    /// Sets a timer. One whose time has come fires when the turn ends, also where time stands still while
+    /// tasks run.
+    pub(crate) fn set_timer(&mut self, time: u64, index: TaskIndex, due: Due) {
+        self.clock.more_is_due |= time <= self.clock.now;
+        self.timers.push(time, index, due);
+    }
+
     /// Returns the time of the first timer that is still wanted, and drops those before it.
     pub(crate) fn first_timer(&mut self) -> Option<u64> {
         while let Some(timer) = self.timers.first()
