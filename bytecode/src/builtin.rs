@@ -465,7 +465,7 @@ macro_rules! for_each_builtin {
             CharCode = character::char_code, cl "CHAR-CODE" ("character");
             /// The code of a character.
             CharInt = character::char_code, cl "CHAR-INT" ("character");
-            /// The character with this code.
+            /// The character with this code; `NIL` for a surrogate, which is none.
             CodeChar = character::code_char, cl "CODE-CHAR" ("code");
             /// The character that a character, or a string or symbol of one, stands for.
             ToCharacter = character::to_character, cl "CHARACTER" ("designator");

@@ -1127,3 +1127,75 @@ e") (read-from-string "#:g") (read-from-string ":Key")))
 ;; indexes of arrays
 ;;; 260
 (answer 260 (list (svref #(1 2) 1) (handler-case (svref "ab" 0) (type-error () 'te)) (schar "ab" 0) (sbit #*01 1) (row-major-aref #2A((1 2) (3 4)) 2) (array-row-major-index #2A((1 2) (3 4)) 1 1) (array-in-bounds-p #(1 2) 2) (handler-case (aref #2A((1)) 0) (error () 'rank))))
+
+;; restarts that belong to a condition
+;;; 261
+(answer 261 (let ((a (make-condition 'simple-error)) (b (make-condition 'simple-error))) (flet ((use (c) (restart-case (with-condition-restarts a (list (first (compute-restarts))) (use-value 1 c) 'none) (use-value (v) (list 'used v))))) (list (use a) (use nil) (use b)))))
+
+;; ... also where a macro signals it
+;;; 262
+(answer 262 (macrolet ((oops (text) `(error ,text))) (handler-bind ((error (lambda (c) (invoke-restart (find-restart 'again c))))) (restart-case (handler-bind ((error (lambda (c) (declare (ignore c)) (error "another")))) (restart-case (oops "one") (again () 'inner))) (again () 'outer)))))
+
+;; arguments of an interactive restart
+;;; 263
+(answer 263 (restart-case (invoke-restart-interactively 'give) (give (a b) :interactive (lambda () (list 1 2)) (list b a))))
+
+;; T and OTHERWISE are keys of ECASE
+;;; 264
+(answer 264 (list (ecase t (t 1)) (handler-case (ecase 2 (t 1)) (type-error () 'te)) (handler-case (ecase 2 (otherwise 1)) (type-error () 'te))))
+
+;; T is a type like any other
+;;; 265
+(answer 265 (list (typecase 'a (t 1) (symbol 2)) (etypecase 1 (symbol 1) (t 2))))
+
+;; classes are types
+;;; 266
+(answer 266 (list (typep 1 (find-class 'integer)) (typep 'a (find-class 'integer)) (multiple-value-list (subtypep (find-class 'integer) 'number)) (coerce '(1 2) (find-class 'vector))))
+
+;; functions (SETF symbol) of uninterned symbols
+;;; 267
+(answer 267 (let* ((s (make-symbol "G")) (n (list 'setf s))) (setf (fdefinition n) (lambda (v c) (rplaca c v) v)) (list (if (fboundp n) t nil) (fboundp s) (eval `(let ((c (list 1))) (list (setf (,s c) 2) c))))))
+
+;; names that are none of functions
+;;; 268
+(answer 268 (list (handler-case (fboundp '(setf a b)) (type-error () 'te)) (handler-case (fboundp '(setf a . b)) (type-error () 'te)) (handler-case (fboundp 1) (type-error () 'te))))
+
+;; floats with contents
+;;; 269
+(answer 269 (list (make-array 2 :element-type 'double-float :initial-contents '(1.0d0 2.0d0)) (make-array 2 :element-type 'double-float)))
+
+;; types of sequences with a size
+;;; 270
+(answer 270 (list (map '(base-string 2) #'identity '(#\a #\b)) (handler-case (make-sequence 'cons 0) (type-error () 'te)) (handler-case (coerce #() 'cons) (error () 'error))))
+
+;; methods agree with their generic function
+;;; 271
+(progn (defgeneric g271 (x &key a)) (answer 271 (mapcar (lambda (m) (handler-case (progn (eval m) 'taken) (error () 'refused))) '((defmethod g271 ((x integer)) x) (defmethod g271 ((x integer) &key b) b) (defmethod g271 ((x integer) &key a b) (list a b)) (defmethod g271 ((x string) &rest r) r)))))
+
+;; the order in which parameters take precedence
+;;; 272
+(progn (defgeneric g272 (x y) (:argument-precedence-order y x) (:method ((x integer) (y t)) 1) (:method ((x t) (y integer)) 2)) (answer 272 (list (g272 1 1) (g272 1 'a) (typep #'g272 'generic-function))))
+
+;; readers of several conditions
+;;; 273
+(progn (define-condition c273 (error) ((a :initarg :a :reader r273))) (define-condition d273 (error) ((b :initarg :b :reader r273))) (answer 273 (list (r273 (make-condition 'c273 :a 1)) (r273 (make-condition 'd273 :b 2)))))
+
+;; the third value is a name or nothing
+;;; 274
+(answer 274 (list (length (multiple-value-list (function-lambda-expression (lambda (x) x)))) (handler-case (function-lambda-expression 1) (error () 'error))))
+
+;; blocks around expanders
+;;; 275
+(progn (defsetf p275 (l) (v) (return-from p275 `(setf (car ,l) ,v))) (answer 275 (let ((l (list 1))) (setf (p275 l) 2) l)))
+
+;; of floats in LOOP, and IT
+;;; 276
+(answer 276 (list (loop for x in nil sum x of-type double-float) (loop for x in '(1 2) count (oddp x) of-type fixnum) (let ((it 'z)) (loop for x in '(a) when x collect it and collect it))))
+
+;; a class gets another name
+;;; 277
+(progn (defclass c277 () ((a :initform 1))) (answer 277 (let ((one (make-instance 'c277))) (setf (find-class 'd277) (find-class 'c277)) (list (typep one 'd277) (progn (setf (find-class 'c277) nil) (find-class 'c277 nil)) (slot-value (make-instance 'd277) 'a)))))
+
+;; values of a list that is none
+;;; 278
+(answer 278 (list (handler-case (values-list '(1 . 2)) (type-error (c) (type-error-datum c))) (handler-case (boole boole-1 nil 1) (type-error () 'te))))

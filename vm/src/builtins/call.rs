@@ -49,7 +49,7 @@ pub(super) fn values_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         rest = pair.cdr;
     }
     if rest.is_true() {
-        return vm.exchange.type_error(arguments[0], "LIST");
+        return vm.exchange.type_error(rest, "LIST");
     }
     vm.exchange.charge(vm.exchange.values.len());
     Err(Exit::Values)

@@ -26,8 +26,10 @@ pub(super) fn char_code(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn code_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let character = arguments[0].as_index().and_then(|code| Value::character(u32::try_from(code).ok()?));
-    match character {
+    let code = arguments[0].as_index().and_then(|code| u32::try_from(code).ok());
+    match code.and_then(Value::character) {
+        // Surrogates are not characters: text has no form for them.
+        Some(_) if code.is_some_and(|code| char::from_u32(code).is_none()) => Ok(Value::NIL),
         Some(character) => Ok(character),
         None => vm.exchange.index_error(arguments[0], Value::CHARACTER_LIMIT as usize),
     }

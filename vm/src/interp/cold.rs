@@ -418,7 +418,7 @@ pub(super) unsafe fn list_to_values(vm: &mut Vm, pc: *const u32, base: *mut Valu
     }
     vm.exchange.charge(vm.exchange.values.len());
     if rest.is_true() {
-        return failure(vm, Raised::Type(list, Expected::Type("LIST")));
+        return failure(vm, Raised::Type(rest, Expected::Type("LIST")));
     }
     Signal::Next
 }
