@@ -1,6 +1,6 @@
 //! `ARCHITECTURE.md` maps the code completely and correctly: its tables list exactly the modules that exist,
-//! and each type in its glossary exists. So does each file that it and the other documents at the root name, and
-//! the READMEs of the crates. Those list the public modules of their crates.
+//! and each type in its glossary exists. So does each file that it, the other documents at the root and the
+//! READMEs of the crates name. Those list the public modules of their crates.
 //! The name of a type means one thing in the whole workspace. Errors have types, files are as long as one
 //! thing takes, and comments are as narrow as code.
 

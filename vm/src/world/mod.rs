@@ -313,8 +313,8 @@ impl World {
         None
     }
 
-    /// Returns the symbol that keeps the function `(setf symbol)` of an uninterned symbol object: the same one
-    /// each time, in the property list of that.
+    /// Returns the symbol that keeps the function `(setf symbol)` of an uninterned symbol object: the same
+    /// one each time, in the property list of that.
     ///
     /// # Errors
     /// As for every allocation.

@@ -226,8 +226,8 @@ impl ImageLoader<'_> {
         Ok(object)
     }
 
-    /// Returns the number of the uninterned symbol whose function `(setf symbol)` a symbol keeps. `None` for all
-    /// other symbols, and if the module does not contain that one.
+    /// Returns the number of the uninterned symbol whose function `(setf symbol)` a symbol keeps. `None` for
+    /// all other symbols, and if the module does not contain that one.
     fn number_of_named(&self, cell: &Symbol) -> Option<u32> {
         let named = symbol_of_setf_cell(cell)?;
         let module = self.module();
