@@ -89,7 +89,9 @@ fn each_habit_has_one_message() {
 
 /// Compiles one line for each word; returns the words whose lines do not have just the warning about it.
 fn words_without_a_warning(role: WordRole, form: impl Fn(&str) -> String) -> Vec<&'static str> {
-    let words: Vec<&str> = WORDS.iter().filter(|word| word.role == role).map(|word| word.word).collect();
+    // The reader refuses `#t` and `#f`.
+    let has_role = WORDS.iter().filter(|word| word.role == role && !word.word.starts_with('#'));
+    let words: Vec<&str> = has_role.map(|word| word.word).collect();
     let text: String = words.iter().map(|word| form(word) + "\n").collect();
     let compiled = program::compile(&[Source::new("words.esl", text)]);
     let is_warned = |line: usize| {

@@ -186,6 +186,8 @@ words! {
 }
 "Scheme" {
     Value "else" => "t";
+    Value "#t" => "t";
+    Value "#f" => "nil";
     Call "define" => "`(defun name (parameters) …)` or `(defvar *name* value)`";
     Call "set!" => "(setf place value)";
     Call "begin" => "(progn …)";

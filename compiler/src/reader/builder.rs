@@ -15,6 +15,7 @@ use esl_bytecode::symbol::{KEYWORD_PACKAGE, Symbol};
 use rustc_hash::FxHashMap;
 
 use crate::diagnostic::code;
+use crate::habit::word;
 
 use super::MAX_ERRORS;
 use super::character;
@@ -347,11 +348,8 @@ impl<'a> DatumBuilder<'a> {
         let message =
             format!("expected a character that has a meaning after `#`, found `{}`", self.slice(start, end));
         let fault = code::INVALID_TOKEN.at(self.span(start, end), message);
-        match self.slice(start, end) {
-            "#t" | "#T" => self.fail(fault.help("write `t` for true")),
-            "#f" | "#F" => self.fail(fault.help("write `nil` for false")),
-            _ => self.fail(fault),
-        }
+        let value = word::value(&self.slice(start, end).to_uppercase());
+        self.fail(value.into_iter().fold(fault, |fault, word| fault.help(word.help())))
     }
 
     /// Returns the list of a mark's symbol and `datum`. The mark ends before `middle`.
