@@ -223,7 +223,9 @@ fn the_watchdog_restarts_a_service_that_dies() {
     next("started");
     next("healthy");
     let mut connection = TcpStream::connect(("127.0.0.1", port)).expect("the service listens");
-    connection.write_all(b"POST /die HTTP/1.1\r\nContent-Length: 0\r\n\r\n").expect("it can be sent");
+    connection
+        .write_all(b"POST /die HTTP/1.1\r\nHost: x\r\nContent-Length: 0\r\n\r\n")
+        .expect("it can be sent");
     next("unhealthy");
     // The watchdog may ask while the service is ending.
     next("ended");

@@ -17,6 +17,9 @@ mod folder;
 mod frames;
 mod grammar;
 mod http;
+mod http_client;
+mod http_peers;
+mod http_server;
 #[cfg(unix)]
 mod lines;
 mod lsp;

@@ -23,6 +23,8 @@ mod arrived;
 mod data;
 mod event_loop;
 mod file;
+#[cfg(feature = "http")]
+mod http;
 mod modules;
 #[cfg(feature = "mqtt")]
 mod mqtt;
@@ -48,6 +50,8 @@ pub use tls::{PemFault, TlsError, TlsIdentity, begin_tls};
 pub fn install_modules(machine: &mut Vm) {
     modules::install(machine);
     os::install(machine);
+    #[cfg(feature = "http")]
+    http::install_conversions(machine);
 }
 
 /// Gives a machine the operations of the modules, which reach the real world. Without them calls fail with
@@ -58,6 +62,8 @@ pub fn install_operations(machine: &mut Vm) {
     let sockets = socket::Sockets::default();
     process::install(machine, &sockets);
     socket::install(machine, &sockets);
+    #[cfg(feature = "http")]
+    http::install(machine);
     #[cfg(feature = "mqtt")]
     mqtt::install(machine);
     #[cfg(feature = "watch")]

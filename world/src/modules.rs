@@ -9,6 +9,7 @@ use crate::data::text_of;
 
 /// The modules, by name.
 const MODULES: &[(&str, &str)] = &[
+    #[cfg(feature = "http")]
     ("http", include_str!("../modules/http.esl")),
     ("json", include_str!("../modules/json.esl")),
     ("log", include_str!("../modules/log.esl")),

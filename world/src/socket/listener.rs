@@ -73,7 +73,7 @@ pub(super) async fn listen(arguments: CallArguments, sockets: Sockets) -> Comple
 }
 
 /// Returns a listener on the first of an address' meanings that can be had.
-async fn bind(address: &str) -> std::io::Result<TcpListener> {
+pub(crate) async fn bind(address: &str) -> std::io::Result<TcpListener> {
     let mut last = None;
     for address in tokio::net::lookup_host(address).await? {
         match bind_to(address) {
@@ -108,7 +108,9 @@ fn is_passing(error: &Error) -> bool {
 
 /// Returns the next connection that `accept` gives. So many peers that there is no descriptor for one more
 /// delay the next, and end nothing.
-async fn next<C, F: Future<Output = std::io::Result<C>>>(accept: impl Fn() -> F) -> Result<C, HostFailure> {
+pub(crate) async fn next<C, F: Future<Output = std::io::Result<C>>>(
+    accept: impl Fn() -> F,
+) -> Result<C, HostFailure> {
     loop {
         match accept().await {
             Err(error) if is_passing(&error) => tokio::time::sleep(PAUSE).await,
@@ -148,7 +150,7 @@ async fn accept_secured(
 }
 
 /// Returns the failure for an address that cannot be used here.
-pub(super) fn bind_failure(error: &Error) -> HostFailure {
+pub(crate) fn bind_failure(error: &Error) -> HostFailure {
     // What the resolver says is no error of the system.
     if error.raw_os_error().is_none() { failure("HOST-NOT-FOUND", error) } else { socket_failure(error) }
 }

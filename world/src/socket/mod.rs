@@ -23,7 +23,10 @@ use tokio::sync::watch;
 
 pub(crate) use connection::Connection;
 use datagram::Datagrams;
-use listener::{Listener, bind_failure};
+use listener::Listener;
+pub(crate) use listener::bind_failure;
+#[cfg(feature = "http")]
+pub(crate) use listener::{bind, next as next_connection};
 
 use crate::arrived::{Arrived, whole_characters};
 use crate::data::{CallArguments, failure, handle, integer, nil, text, text_of_bytes};
@@ -68,7 +71,7 @@ type SocketTable = (i64, HashMap<i64, Arc<Socket>>);
 #[derive(Clone, Default)]
 pub(crate) struct Sockets(Arc<Mutex<SocketTable>>);
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // What it guards is whole at every moment, so a panic elsewhere does not corrupt it.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -78,7 +81,7 @@ fn closed() -> HostFailure {
 }
 
 /// Returns the failure for an error of the system.
-fn socket_failure(error: &Error) -> HostFailure {
+pub(crate) fn socket_failure(error: &Error) -> HostFailure {
     let cause = match error.kind() {
         ErrorKind::ConnectionRefused => "CONNECTION-REFUSED",
         ErrorKind::ConnectionReset | ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe => {
