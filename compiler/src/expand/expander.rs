@@ -13,6 +13,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashSet;
 
+use super::allowed::AllowedWarnings;
 use super::chunk::{Chunk, OpenChunk, Purpose};
 use super::failure::{FailurePlace, MacroFailure};
 use super::form::{Checked, Form, Make, name};
@@ -82,6 +83,8 @@ pub struct Expander {
     pub(super) reported: FxHashSet<(&'static str, Span, String)>,
     /// Number of errors so far.
     pub(super) errors: usize,
+    /// Warnings that forms allow.
+    pub(super) allowed: Vec<AllowedWarnings>,
     /// Whether the forms are those of a file, to which objects cannot be written.
     pub(super) is_file: bool,
     /// Whether the limit on depth has been reported for the current top-level form.
@@ -118,6 +121,7 @@ impl Expander {
             diagnostics: Vec::new(),
             reported: FxHashSet::default(),
             errors: 0,
+            allowed: Vec::new(),
             is_file: false,
             is_too_deep: false,
             is_given_up: false,

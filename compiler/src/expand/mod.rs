@@ -74,6 +74,7 @@
 //! forms, whose methods are methods of the `Expander`, and last the table of operators. A file uses only
 //! files before it; `tests/layers.rs` holds that.
 
+mod allowed;
 mod argument;
 mod backquote;
 mod binding;

@@ -10,8 +10,8 @@ use rustc_hash::FxHashMap;
 
 use super::expander::{Expander, Operator};
 use super::{
-    backquote, binding, call, control, define, destructure, handler, lambda, local, modify, recovery, values,
-    variable,
+    allowed, backquote, binding, call, control, define, destructure, handler, lambda, local, modify,
+    recovery, values, variable,
 };
 
 /// The operators of the package `COMMON-LISP`.
@@ -87,6 +87,7 @@ const OWN: &[(&str, Operator)] = &[
     ("%QUOTE-OBJECT", control::quote_object),
     ("%UNQUOTE", backquote::misplaced_unquote),
     ("%UNQUOTE-SPLICING", backquote::misplaced_unquote),
+    ("%WITH-ALLOWED-WARNINGS", allowed::with_allowed_warnings),
     ("%WITH-FAILURE-CLEANUP", recovery::with_failure_cleanup),
     ("%WITH-HANDLERS", control::with_handlers),
     ("%WITH-MASK", control::with_mask),

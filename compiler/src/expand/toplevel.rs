@@ -9,7 +9,7 @@
 
 use esl_bytecode::compile::{Environment, GlobalFunction, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_bytecode::symbol::CL_PACKAGE;
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE};
 
 use super::binding::symbol_macros;
 use super::chunk::Purpose;
@@ -76,6 +76,11 @@ impl Expander {
             return Ok(());
         }
         let name = if form.operator.is_in(CL_PACKAGE) { form.operator.name() } else { "" };
+        if form.operator.is_in(ESL_PACKAGE) && form.operator.name() == "%WITH-ALLOWED-WARNINGS" {
+            let body = self.allow_warnings(&form)?;
+            self.top_forms(body, top);
+            return Ok(());
+        }
         match name {
             "PROGN" => self.top_forms(form.args, top),
             "LOCALLY" => {

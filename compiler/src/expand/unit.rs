@@ -8,6 +8,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Symbol, setf_cell};
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::allowed::AND_HERE;
 use super::argument::{refused_by, usage};
 use super::form::{is_known, name, name_with_package, plain, with_namesake};
 use super::function::FunctionName;
@@ -15,8 +16,6 @@ use super::global::{GlobalUses, NameUsed, PendingCall, accepts, wrong_count};
 use crate::diagnostic::code;
 use crate::habit::word;
 
-/// Uses of an undefined name that are shown besides the first.
-const SHOWN: usize = 3;
 /// Undefined names for which similar ones are suggested; each suggestion looks at all names.
 const COMPARED: usize = 50;
 
@@ -448,8 +447,8 @@ impl Similar<'_> {
 
 fn with_uses(mut diagnostic: Diagnostic, further: &[NameUsed]) -> Diagnostic {
     let first = diagnostic.primary.span;
-    for place in further.iter().filter(|place| place.span != first).take(SHOWN) {
-        diagnostic.secondary.push(Label { span: place.span, text: "and here".into() });
+    for place in further.iter().filter(|place| place.span != first) {
+        diagnostic.secondary.push(Label { span: place.span, text: AND_HERE.into() });
     }
     diagnostic
 }

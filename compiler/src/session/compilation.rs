@@ -364,6 +364,7 @@ impl CompilationState {
     /// Ends the compilation. Findings that follow from `foreign` forms are left out.
     fn end(&mut self, mut foreign: Vec<Span>) -> Step {
         let mut diagnostics = std::mem::take(&mut self.diagnostics);
+        self.expander.drop_allowed(&mut diagnostics);
         for diagnostic in &mut diagnostics {
             self.renumber(diagnostic);
         }
