@@ -1,12 +1,13 @@
 //! `eslc`: compiles and checks ESL programs, and shows their expansion and bytecode.
 #![forbid(unsafe_code)]
 
+use std::collections::HashSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
-use esl::command::{self, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain};
+use esl::command::{self, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, WarningOptions, complain};
 use esl::format::{FormatOptions, format_files};
 use esl::module_path::ModulePath;
 use esl::program::{self, Compiled, Modules, Program, Source};
@@ -33,6 +34,8 @@ struct LibraryFolders {
 struct SourceOptions {
     #[command(flatten)]
     style: Style,
+    #[command(flatten)]
+    warnings: WarningOptions,
     #[command(flatten)]
     modules: LibraryFolders,
 }
@@ -98,9 +101,13 @@ enum EslcAction {
         compiling: SourceOptions,
     },
     /// Report errors and warnings, and write nothing
+    ///
+    /// Files that are named are checked together, as parts of one program; each source in a folder by itself.
+    /// Exit status: 0 no errors; 2 wrong usage, or a file that cannot be read; 3 there are errors, or warnings
+    /// that are denied.
     Check {
-        /// Source files; `-` is standard input
-        #[arg(required = true, value_name = "FILE")]
+        /// Source files, or folders, whose `.esl` files are meant; `-` is standard input; by default this folder
+        #[arg(value_name = "FILE")]
         files: Vec<PathBuf>,
         #[command(flatten)]
         compiling: SourceOptions,
@@ -154,24 +161,38 @@ enum EslcAction {
     },
 }
 
+/// Words in place of a subcommand, and what to type.
+const HABITS: command::Habits = &[
+    ("indent", "eslc format"),
+    ("lint", "eslc check"),
+    ("clippy", "eslc check"),
+    ("build", "eslc compile"),
+    ("init", "eslc new"),
+    ("create", "eslc new"),
+    ("macroexpand", "eslc expand"),
+    ("disassemble", "eslc disasm"),
+    ("run", "eslvm run"),
+    ("test", "eslvm test"),
+    ("explore", "eslvm explore"),
+    ("replay", "eslvm replay"),
+    ("attach", "eslvm attach"),
+    ("repl", "eslvm repl"),
+];
+
 fn main() -> ExitCode {
-    let status = match Eslc::parse().action {
+    let status = match command::parse::<Eslc>("eslc check", HABITS).action {
         EslcAction::Compile { files, output: Some(output), compiling } => {
-            compile(&files, &output, &compiling.path(&files), Modules::Inside, &compiling.style)
+            compile(&files, &output, Modules::Inside, &compiling)
         }
         EslcAction::Compile { files, output: None, compiling } => compile_each(&files, &compiling),
-        EslcAction::Check { files, compiling } => check(&files, &compiling.path(&files), &compiling.style),
-        EslcAction::Disasm { file, compiling } => {
-            disassemble(&file, &compiling.path(std::slice::from_ref(&file)), &compiling.style)
-        }
+        EslcAction::Check { files, compiling } => check(&files, &compiling),
+        EslcAction::Disasm { file, compiling } => disassemble(&file, &compiling),
         EslcAction::Format { options, modules } => Ok(format_files(&options, &modules.library)),
         EslcAction::New { name } => Ok(esl::new::new_project(&name)),
         EslcAction::Lsp { modules, .. } => Ok(esl::lsp::serve(modules.library)),
         EslcAction::Completions { shell } => Ok(command::print_completions(shell, Eslc::command())),
         EslcAction::Man { folder } => Ok(command::write_man_pages(Eslc::command(), folder.as_deref())),
-        EslcAction::Expand { file, compiling } => {
-            expand(&file, &compiling.path(std::slice::from_ref(&file)), &compiling.style)
-        }
+        EslcAction::Expand { file, compiling } => expand(&file, &compiling),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))
 }
@@ -184,13 +205,31 @@ fn read(files: &[PathBuf]) -> Result<Vec<Source>, u8> {
     files.iter().map(|file| command::read_source(file)).collect()
 }
 
-/// Compiles sources and prints the diagnostics. Returns the program, if there was no error.
-fn compiled(sources: &[Source], path: &ModulePath, modules: Modules, style: &Style) -> Result<Compiled, u8> {
+/// Compiles sources, without the warnings that are allowed, and with those that are denied as errors.
+fn compile_sources(
+    sources: &[Source],
+    path: &ModulePath,
+    modules: Modules,
+    options: &SourceOptions,
+) -> Result<Compiled, u8> {
+    options.warnings.check()?;
     let names: Vec<&str> = sources.iter().map(|source| &*source.name).collect();
     let line = || format!("compiling {}", names.join(", "));
-    let compiled =
-        command::StatusLine::new(style.quiet).during(line, || program::compile_with(sources, path, modules));
-    print_diagnostics(&compiled, style);
+    let mut compiled = command::StatusLine::new(options.style.quiet)
+        .during(line, || program::compile_with(sources, path, modules));
+    options.warnings.apply(&mut compiled);
+    Ok(compiled)
+}
+
+/// Compiles sources and prints the diagnostics. Returns the program, if there was no error.
+fn compiled(
+    sources: &[Source],
+    path: &ModulePath,
+    modules: Modules,
+    options: &SourceOptions,
+) -> Result<Compiled, u8> {
+    let compiled = compile_sources(sources, path, modules, options)?;
+    print_diagnostics(&compiled, &options.style);
     if compiled.has_errors() { Err(NOT_COMPILED) } else { Ok(compiled) }
 }
 
@@ -207,31 +246,24 @@ fn print_diagnostics(compiled: &Compiled, style: &Style) {
     command::print_diagnostics(compiled, &Renderer { color, format });
 }
 
-fn compile(
-    files: &[PathBuf],
-    output: &Path,
-    path: &ModulePath,
-    modules: Modules,
-    style: &Style,
-) -> Result<u8, u8> {
+fn compile(files: &[PathBuf], output: &Path, modules: Modules, options: &SourceOptions) -> Result<u8, u8> {
     let sources = read(files)?;
     command::refuse_overwriting(output, files.iter().map(PathBuf::as_path))?;
-    let compiled = compiled(&sources, path, modules, style)?;
+    let compiled = compiled(&sources, &options.path(files), modules, options)?;
     // The modules that it requires are known now.
     command::refuse_overwriting(output, compiled.sources.names().map(Path::new))?;
     write(&compiled.program.ok_or(NOT_COMPILED)?, output)
 }
 
-fn compile_each(files: &[PathBuf], compiling: &SourceOptions) -> Result<u8, u8> {
+fn compile_each(files: &[PathBuf], options: &SourceOptions) -> Result<u8, u8> {
     let mut status = SUCCESS;
     for file in files {
         if file.as_os_str() == "-" {
             complain("a program from standard input has no name: say with -o where it goes");
             return Err(USAGE);
         }
-        let files = std::slice::from_ref(file);
-        let path = compiling.path(files);
-        let result = compile(files, &file.with_extension("eslb"), &path, Modules::Apart, &compiling.style);
+        let result =
+            compile(std::slice::from_ref(file), &file.with_extension("eslb"), Modules::Apart, options);
         status = status.max(result.unwrap_or_else(|status| status));
     }
     Ok(status)
@@ -249,24 +281,63 @@ fn write(program: &Program, output: &Path) -> Result<u8, u8> {
     })
 }
 
-fn check(files: &[PathBuf], path: &ModulePath, style: &Style) -> Result<u8, u8> {
-    compiled(&read(files)?, path, Modules::Inside, style).map(|_| SUCCESS)
+fn check(paths: &[PathBuf], options: &SourceOptions) -> Result<u8, u8> {
+    let here = [PathBuf::from(".")];
+    let (folders, files): (Vec<PathBuf>, Vec<PathBuf>) =
+        if paths.is_empty() { &here[..] } else { paths }.iter().cloned().partition(|path| path.is_dir());
+    let mut status = SUCCESS;
+    let mut told = HashSet::new();
+    if !files.is_empty() {
+        status = check_program(&files, options, &mut told)?;
+    }
+    for folder in &folders {
+        let sources = command::sources_in(folder)?;
+        if sources.is_empty() {
+            complain(format_args!("no source (*.esl) is in {}", folder.display()));
+            return Err(USAGE);
+        }
+        for file in &sources {
+            status = status.max(check_program(std::slice::from_ref(file), options, &mut told)?);
+        }
+    }
+    Ok(status)
 }
 
-fn disassemble(file: &Path, path: &ModulePath, style: &Style) -> Result<u8, u8> {
+/// Checks files as one program. What was told before, of a module that several files require, is left out.
+fn check_program(
+    files: &[PathBuf],
+    options: &SourceOptions,
+    told: &mut HashSet<(String, u32, String)>,
+) -> Result<u8, u8> {
+    let mut compiled = compile_sources(&read(files)?, &options.path(files), Modules::Inside, options)?;
+    let has_errors = compiled.has_errors();
+    let Compiled { diagnostics, sources, .. } = &mut compiled;
+    diagnostics.retain(|diagnostic| {
+        let place = diagnostic.primary.span;
+        let source = sources.name(place.source).unwrap_or_default();
+        told.insert((source.to_string(), place.start, diagnostic.message.clone()))
+    });
+    print_diagnostics(&compiled, &options.style);
+    Ok(if has_errors { NOT_COMPILED } else { SUCCESS })
+}
+
+fn disassemble(file: &Path, options: &SourceOptions) -> Result<u8, u8> {
+    let path = options.path(&[file.to_path_buf()]);
     let program = match command::read_program(file)? {
         ProgramFile::Compiled(program) => program,
         ProgramFile::Source(source) => {
-            compiled(&[source], path, Modules::Apart, style)?.program.ok_or(NOT_COMPILED)?
+            compiled(&[source], &path, Modules::Apart, options)?.program.ok_or(NOT_COMPILED)?
         }
     };
     print(&program.disassemble())
 }
 
-fn expand(file: &Path, path: &ModulePath, style: &Style) -> Result<u8, u8> {
+fn expand(file: &Path, options: &SourceOptions) -> Result<u8, u8> {
     let source = command::read_source(file)?;
-    let (text, compiled) = program::expand(&source, path);
-    print_diagnostics(&compiled, style);
+    options.warnings.check()?;
+    let (text, mut compiled) = program::expand(&source, &options.path(&[file.to_path_buf()]));
+    options.warnings.apply(&mut compiled);
+    print_diagnostics(&compiled, &options.style);
     print(&text)?;
     if compiled.has_errors() { Err(NOT_COMPILED) } else { Ok(SUCCESS) }
 }

@@ -11,6 +11,7 @@
 #![allow(clippy::print_stderr, reason = "commands print")]
 
 mod file;
+mod folder;
 #[cfg(feature = "cli")]
 mod rights;
 #[cfg(feature = "cli")]
@@ -20,6 +21,10 @@ mod signal;
 mod size;
 #[cfg(feature = "cli")]
 mod status_line;
+#[cfg(feature = "cli")]
+mod usage;
+#[cfg(feature = "cli")]
+mod warnings;
 
 use std::path::Path;
 
@@ -29,6 +34,7 @@ use esl_compiler::diagnostic::{Format, Renderer};
 use crate::program::{Compiled, Ended};
 
 pub use file::{ProgramFile, read_program, read_source, refuse_overwriting, replace_file};
+pub use folder::{is_test_file, sources_in};
 #[cfg(feature = "cli")]
 pub use rights::RightsOptions;
 #[cfg(feature = "cli")]
@@ -38,6 +44,10 @@ pub use signal::{Interrupts, SignalTarget, end_on_signal, interrupt_on_signal};
 pub use size::{SizeError, parse_size, parse_stack};
 #[cfg(feature = "cli")]
 pub use status_line::{StatusLine, wants_color};
+#[cfg(feature = "cli")]
+pub use usage::{Habits, parse};
+#[cfg(feature = "cli")]
+pub use warnings::WarningOptions;
 
 /// Exit status of success.
 pub const SUCCESS: u8 = 0;
@@ -49,6 +59,8 @@ pub const USAGE: u8 = 2;
 pub const NOT_COMPILED: u8 = 3;
 /// Exit status of a run in which no task can ever run again.
 pub const DEADLOCKED: u8 = 4;
+/// Exit status of `eslvm test` if there was no test to run.
+pub const NO_TESTS: u8 = 5;
 /// Exit status of a run that has spent its budget, or needs more memory than it may have.
 pub const BUDGET_OR_MEMORY_SPENT: u8 = 5;
 /// Exit status of a replay that has taken another course than the recorded run.

@@ -7,6 +7,7 @@ mod background;
 mod bad_input;
 #[cfg(unix)]
 mod browser;
+mod checking;
 mod coverage;
 mod deadlock;
 mod editor;

@@ -1,0 +1,72 @@
+//! Which warnings of the compiler a command takes for errors, and which it leaves out.
+
+use clap::Args;
+use esl_bytecode::diagnostic::Severity;
+use esl_compiler::diagnostic::code;
+use similar::TextDiff;
+
+use super::{USAGE, complain};
+use crate::program::Compiled;
+
+/// Stands for all warnings.
+const ALL: &str = "warnings";
+
+/// Warnings that are errors, and warnings that are left out.
+#[derive(Args, Clone, Debug, Default)]
+pub struct WarningOptions {
+    /// Take warnings of this code for errors; `warnings` stands for all
+    #[arg(long, value_name = "CODE", value_parser = parse_code)]
+    pub deny: Vec<String>,
+    /// Report no warnings of this code, also if all are denied
+    #[arg(long, value_name = "CODE", value_parser = parse_code)]
+    pub allow: Vec<String>,
+}
+
+/// Checks the code of a warning.
+fn parse_code(text: &str) -> Result<String, String> {
+    match code::find(text) {
+        _ if text == ALL => Ok(text.into()),
+        Some(code) if code.severity == Severity::Warning => Ok(text.into()),
+        Some(_) => Err("this is the code of an error, which cannot be allowed and is always denied".into()),
+        None => {
+            let warnings = code::ALL.iter().filter(|code| code.severity == Severity::Warning);
+            let near = warnings.map(|code| (TextDiff::from_chars(code.name, text).ratio(), code.name));
+            let near = near.filter(|(likeness, _)| *likeness > 0.7).max_by(|a, b| a.0.total_cmp(&b.0));
+            Err(match near {
+                Some((_, name)) => format!("no warning has this code; did you mean `{name}`?"),
+                None => {
+                    format!("no warning has this code: it stands in brackets in a message; `{ALL}` is all")
+                }
+            })
+        }
+    }
+}
+
+impl WarningOptions {
+    /// Checks that no code is both denied and allowed.
+    ///
+    /// # Errors
+    /// The exit status, after a message.
+    pub fn check(&self) -> Result<(), u8> {
+        match self.allow.iter().find(|code| self.deny.contains(code)) {
+            None => Ok(()),
+            Some(code) => {
+                complain(format_args!("`{code}` is both denied and allowed: leave one of the options out"));
+                Err(USAGE)
+            }
+        }
+    }
+
+    /// Leaves out the warnings that are allowed, and makes errors of those that are denied.
+    pub fn apply(&self, compiled: &mut Compiled) {
+        let has = |codes: &[String], name: &str| codes.iter().any(|code| code == name || code == ALL);
+        compiled.diagnostics.retain(|diagnostic| {
+            diagnostic.severity == Severity::Error || !has(&self.allow, diagnostic.code)
+        });
+        for diagnostic in &mut compiled.diagnostics {
+            if has(&self.deny, diagnostic.code) {
+                diagnostic.severity = Severity::Error;
+            }
+        }
+    }
+}
