@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use esl::explore::{Settings, explore};
+use esl::explore::{Grain, Settings, explore};
 use esl::host::VirtualHost;
 use esl::program::{self, Program, Source};
 use esl::{Config, Engine};
@@ -184,7 +184,13 @@ fn exploration(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("exploration");
     group.sample_size(10).sampling_mode(SamplingMode::Flat).throughput(Throughput::Elements(STATES as u64));
     for (name, snapshots) in [("snapshots", true), ("new machines", false)] {
-        let settings = Settings { states: STATES, snapshots, output: false, ..Settings::default() };
+        let settings = Settings {
+            grain: Grain::Changes,
+            states: STATES,
+            snapshots,
+            output: false,
+            ..Settings::default()
+        };
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 let found = explore(&program, &settings).expect("it can start");

@@ -1,7 +1,6 @@
 //! `eslvm explore`: runs a program under all schedules, and tells of those that end badly.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
 
-use std::collections::HashMap;
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -11,9 +10,10 @@ use std::time::{Duration, Instant};
 use esl_vm::vm::Vm;
 use serde_json::json;
 
+use super::forms::SourceForms;
 use super::{
-    Behaviour, Exploration, Grain, Livelock, Schedule, SearchLimit, SearchProgress, Settings, StandingTask,
-    Switch, TimerGrain, explore_together, tell_switches,
+    Behaviour, Exploration, ExplorationScope, Grain, Livelock, Schedule, ScheduleEvent, SearchLimit,
+    SearchProgress, Settings, TimerGrain, explore_together, grains, tell, tell_steps,
 };
 use crate::command::{self, FAILED, NOT_PROVED, SUCCESS, StatusLine, USAGE, complain};
 use crate::error::Error;
@@ -29,8 +29,10 @@ macro_rules! say {
 /// How to explore, and what to say of it.
 #[derive(Clone, Debug)]
 pub struct ExplorationOptions {
-    /// What is explored.
+    /// What is explored, but for the grain.
     pub settings: Settings,
+    /// The grain, if one is asked for.
+    pub grain: Option<Grain>,
     /// Number of threads.
     pub jobs: usize,
     /// Time after which the search gives up.
@@ -56,39 +58,83 @@ struct Finding {
     errors: String,
 }
 
-/// The lines of the sources that places lie in.
-#[derive(Default)]
-struct PlaceTexts(HashMap<String, Vec<String>>);
-
-impl PlaceTexts {
-    /// Returns a place with the text of its line, if its source can still be read.
-    fn describe(&mut self, place: &str) -> String {
-        let mut parts = place.rsplitn(3, ':');
-        let (_, line, source) = (parts.next(), parts.next(), parts.next());
-        let (Some(line), Some(source)) = (line.and_then(|line| line.parse::<usize>().ok()), source) else {
-            return place.into();
-        };
-        let lines = self.0.entry(source.into()).or_insert_with(|| {
-            let text = std::fs::read_to_string(source).unwrap_or_default();
-            text.lines().map(|line| line.trim().to_string()).collect()
-        });
-        match lines.get(line.saturating_sub(1)) {
-            Some(text) if !text.is_empty() => format!("{place}: {text}"),
-            _ => place.into(),
-        }
-    }
-}
-
 /// Explores a program, and prints what was found. Returns the exit status: 0 if no schedule ends badly, 1 if
-/// one does, 7 if none was found and not all were tried.
+/// one does, 7 if none was found and there may be one.
 pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &ExplorationOptions) -> u8 {
     let prepare = |machine: &mut Vm| crate::program::set_module_path(machine, path);
     let started = Instant::now();
-    let status_line = StatusLine::new(options.is_quiet);
-    let line = Mutex::new(String::from("exploring"));
+    let grains = grains(program, options.grain);
+    let mut tried = Vec::new();
+    let (settings, scope, found, findings) = loop {
+        let settings = Settings { grain: grains[tried.len()], ..options.settings };
+        let found = match search(program, options, &settings, &prepare, started) {
+            Ok(found) => found,
+            Err(error) => {
+                complain(error);
+                return USAGE;
+            }
+        };
+        let scope = ExplorationScope::new(program, &settings, &found);
+        let findings = findings(&found);
+        let is_last = tried.len() + 1 == grains.len();
+        if is_last || !findings.is_empty() || found.limit.is_some() {
+            break (settings, scope, found, findings);
+        }
+        tried.push(scope);
+    };
+    let mut forms = SourceForms::default();
+    for (finding, number) in findings.iter().zip(1..) {
+        let told = tell(program, file, &prepare, (options, &settings), finding, number, &mut forms);
+        if let Err(error) = told {
+            complain(error);
+            return USAGE;
+        }
+    }
+    if options.json {
+        let limit = found.limit.map(|limit| match limit {
+            SearchLimit::Asked => "time".into(),
+            limit => format!("{limit:?}").to_lowercase(),
+        });
+        let verdict = match (findings.is_empty(), scope.is_complete()) {
+            (false, _) => "violation",
+            (true, true) => "complete",
+            (true, false) => "bounded",
+        };
+        let unseen: Vec<String> = scope.unseen.iter().map(ToString::to_string).collect();
+        let (grain, timers) = (scope.grain.name(), scope.timers.name());
+        let (states, runs, count) = (found.states, found.runs, findings.len());
+        say!(
+            "{}",
+            json!({
+                "verdict": verdict, "grain": grain, "timers": timers, "unseen": unseen, "states": states,
+                "runs": runs, "findings": count, "limit": limit, "seconds": started.elapsed().as_secs_f64(),
+            })
+        );
+    } else {
+        print_summary(&scope, &tried, found.has_cycle, findings.len());
+    }
+    match (findings.is_empty(), scope.is_complete()) {
+        (false, _) => FAILED,
+        (true, true) => SUCCESS,
+        (true, false) => NOT_PROVED,
+    }
+}
+
+/// Explores a program with these settings, and tells a terminal how far it is.
+///
+/// # Errors
+/// As [`explore_together`].
+fn search(
+    program: &Program,
+    options: &ExplorationOptions,
+    settings: &Settings,
+    prepare: super::Prepare<'_>,
+    started: Instant,
+) -> Result<Exploration<Behaviour>, Error> {
+    let line = Mutex::new(format!("exploring at grain {}", settings.grain.name()));
     let search = || {
         let mut told = started;
-        explore_together(program, &options.settings, options.jobs, &prepare, |progress| {
+        explore_together(program, settings, options.jobs, prepare, |progress| {
             if told.elapsed() > Duration::from_millis(100) {
                 told = Instant::now();
                 *line.lock().unwrap_or_else(PoisonError::into_inner) = progress_line(progress, started);
@@ -96,41 +142,8 @@ pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &Explorat
             started.elapsed() < options.time
         })
     };
-    let found = status_line.during(|| line.lock().unwrap_or_else(PoisonError::into_inner).clone(), search);
-    let found = match found {
-        Ok(found) => found,
-        Err(error) => {
-            complain(error);
-            return USAGE;
-        }
-    };
-    let findings = findings(&found);
-    let mut lines = PlaceTexts::default();
-    for (finding, number) in findings.iter().zip(1..) {
-        if let Err(error) = tell(program, file, &prepare, options, finding, number, &mut lines) {
-            complain(error);
-            return USAGE;
-        }
-    }
-    let seconds = started.elapsed().as_secs_f64();
-    if options.json {
-        let limit = found.limit.map(|limit| match limit {
-            SearchLimit::Asked => "time".into(),
-            limit => format!("{limit:?}").to_lowercase(),
-        });
-        let (states, runs, count) = (found.states, found.runs, findings.len());
-        say!(
-            "{}",
-            json!({ "states": states, "runs": runs, "findings": count, "limit": limit, "seconds": seconds })
-        );
-    } else {
-        print_summary(&found, &options.settings, findings.len());
-    }
-    match (findings.is_empty(), found.limit) {
-        (false, _) => FAILED,
-        (true, None) => SUCCESS,
-        (true, Some(_)) => NOT_PROVED,
-    }
+    let status_line = StatusLine::new(options.is_quiet);
+    status_line.during(|| line.lock().unwrap_or_else(PoisonError::into_inner).clone(), search)
 }
 
 /// Returns the ways in which runs end badly, the one with the fewest switches first.
@@ -207,13 +220,13 @@ fn tell(
     program: &Program,
     file: &Path,
     prepare: super::Prepare<'_>,
-    options: &ExplorationOptions,
+    (options, settings): (&ExplorationOptions, &Settings),
     finding: &Finding,
     number: usize,
-    lines: &mut PlaceTexts,
+    forms: &mut SourceForms,
 ) -> Result<(), TellError> {
     let name = schedule_name(file, number);
-    let schedule = Schedule::new(program, &options.settings, finding.choices.clone());
+    let schedule = Schedule::new(program, settings, finding.choices.clone());
     let written = std::fs::write(&name, schedule.to_string());
     written.map_err(|error| TellError::Schedule(name.clone(), error))?;
     let timeline = options.timeline.as_ref().filter(|_| number == 1);
@@ -226,29 +239,35 @@ fn tell(
         }
         Ok::<(), Error>(())
     };
-    let mut switches = Vec::new();
-    let mut told = |switch| switches.push(switch);
-    tell_switches(program, &options.settings, &finding.choices, finding.ends, &prepare, &mut told)
+    let mut steps = Vec::new();
+    tell_steps(program, settings, &finding.choices, finding.ends, &prepare, &mut |step| steps.push(step))
         .map_err(TellError::Program)?;
     if let Some(timeline) = pictured.into_inner().unwrap_or_else(PoisonError::into_inner) {
         let told = timeline.and_then(Timeline::complete);
         told.map_err(TellError::Timeline)?;
     }
+    let switches = steps.iter().filter_map(|step| match &step.event {
+        ScheduleEvent::Switch(switch) => Some(switch),
+        ScheduleEvent::Use { .. } => None,
+    });
     if options.json {
-        let switches: Vec<_> = switches.iter().map(|switch| text(switch, lines)).collect();
-        let (what, errors) = (&finding.what, &finding.errors);
-        let repeated = finding.repeated;
+        let switches: Vec<_> = switches.map(|switch| tell::text(switch, forms)).collect();
+        let (what, errors, repeated) = (&finding.what, &finding.errors, finding.repeated);
+        let steps = tell::json(&steps, forms);
         say!(
             "{}",
-            json!({ "finding": what, "switches": switches, "repeated": repeated, "report": errors, "schedule": name })
+            json!({
+                "finding": what, "grain": settings.grain.name(), "timers": settings.timers.name(),
+                "switches": switches, "steps": steps, "repeated": repeated, "report": errors, "schedule": name,
+            })
         );
         return Ok(());
     }
     say!("finding {number}: {}", finding.what);
-    for (switch, number) in switches.iter().zip(1..) {
-        say!("  {number}. {}", text(switch, lines).replace('\n', "\n     "));
+    for line in tell::lines(&steps, forms) {
+        say!("  {}", line.replace('\n', "\n  "));
     }
-    match (finding.repeated, switches.len()) {
+    match (finding.repeated, switches.count()) {
         (0, _) => {}
         (1, number) => say!("  then {number} again, and so on"),
         (repeated, number) => say!("  then {} to {number} again, and so on", number + 1 - repeated),
@@ -258,75 +277,28 @@ fn tell(
     Ok(())
 }
 
-/// Returns a choice in words.
-fn text(switch: &Switch, lines: &mut PlaceTexts) -> String {
-    let mut place = |task: &StandingTask, word: &str| {
-        task.place.as_ref().map_or(String::new(), |place| format!(" {word} {}", lines.describe(place)))
-    };
-    match switch {
-        Switch::Preemption { stopped, next } => format!(
-            "{} stops{}\n{} goes on{}",
-            stopped.label,
-            place(stopped, "before"),
-            next.label,
-            place(next, "at")
-        ),
-        Switch::Order { oldest, next } => {
-            format!("{} goes on{}\nbefore {} does", next.label, place(next, "at"), oldest.label)
+/// Prints the verdict, and in a line what was not tried. `tried` are the scopes at coarser grains, at which
+/// nothing was found.
+fn print_summary(scope: &ExplorationScope, tried: &[ExplorationScope], has_cycle: bool, findings: usize) {
+    match (findings, scope.why_not_complete()) {
+        (0, None) => say!("complete: no schedule ends badly ({scope})"),
+        (0, Some(why)) => say!("bounded, not proved: {why}; no schedule so far ends badly ({scope})"),
+        (_, Some(why)) if scope.limit.is_some() => {
+            say!("violation: findings: {findings}; bounded: {why} ({scope})")
         }
-        Switch::Timer { task, passed } => format!(
-            "{} s pass, and timers end,\nbefore {} goes on{}",
-            *passed as f64 / 1e9,
-            task.label,
-            place(task, "at")
-        ),
-        Switch::Choice { task, form } => {
-            format!("{} chooses form {}{}", task.label, form + 1, place(task, "at"))
-        }
+        (_, _) => say!("violation: findings: {findings} ({scope})"),
     }
-}
-
-fn print_summary(found: &Exploration<Behaviour>, settings: &Settings, findings: usize) {
-    let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
-    let figures = format!("{}, {}", counted(found.states, "state"), counted(found.runs, "run"));
-    let why = match found.limit {
-        None => None,
-        Some(SearchLimit::States) => Some("the limit of states is reached"),
-        Some(SearchLimit::Memory) => Some("the limit of memory is reached"),
-        Some(SearchLimit::Switches) => Some("schedules with more switches were not tried"),
-        Some(SearchLimit::Faults) => Some("more choices that are not the first were not tried"),
-        Some(SearchLimit::Asked) => Some("the time is over"),
-    };
-    match (findings, why) {
-        (0, None) => say!("complete: no schedule ends badly ({figures})"),
-        (0, Some(why)) => say!("bounded, not proved: {why}; no schedule so far ends badly ({figures})"),
-        (_, None) => say!("complete: findings: {findings} ({figures})"),
-        (_, Some(why)) => say!("bounded: {why}; findings: {findings} ({figures})"),
+    if let (0, Some(coarser)) = (findings, tried.last())
+        && !scope.is_complete()
+    {
+        let why = coarser.why_not_complete().unwrap_or_default();
+        say!("all schedules at grain {} were tried before ({coarser}), but {why}", coarser.grain.name());
     }
-    if found.has_cycle {
-        say!(
-            "Some schedules return to where they were: they can go on for ever, if they are unfair to a task."
-        );
-    }
-    let timers = match settings.timers {
-        TimerGrain::Idle => "; timers that end before others have done their work (--timers any)",
-        TimerGrain::Any => "",
-    };
-    let reads = match settings.grain {
-        Grain::Changes => "; switches before a task only looks at what others do (--grain reads)",
-        Grain::Reads | Grain::Variables | Grain::Ticks => "",
-    };
-    let variables = match settings.grain {
-        Grain::Variables | Grain::Ticks => "",
-        Grain::Changes | Grain::Reads => "variables (--grain variables), and of ",
-    };
-    let objects = format!(
-        "changes of {variables}slots and tables (--grain ticks), by tasks that are outside of critical sections"
-    );
-    match (settings.grain, settings.timers) {
-        (Grain::Ticks, TimerGrain::Any) => {}
-        (Grain::Ticks, TimerGrain::Idle) => say!("Not seen: {}.", timers.trim_start_matches("; ")),
-        _ => say!("Not seen: {objects}{reads}{timers}."),
+    let timers = (scope.timers == TimerGrain::Idle).then_some("timers that end early (--timers any)");
+    let cycle = has_cycle.then_some("schedules that are unfair to a task, which may go on for ever");
+    let left: Vec<&str> = [timers, cycle].into_iter().flatten().collect();
+    if !left.is_empty() {
+        say!("not tried: {}", left.join("; "));
     }
 }
 

@@ -21,18 +21,25 @@
 
 #[cfg(feature = "cli")]
 mod command;
+mod forms;
 mod schedule;
+#[cfg(feature = "cli")]
+mod tell;
+mod unseen;
+mod verdict;
 
 #[cfg(feature = "cli")]
 pub use command::{ExplorationOptions, read_schedule, run};
 pub use esl_vm::explore::{
-    Exploration, ExploredEnding, Grain, Livelock, SearchLimit, SearchProgress, Settings, StandingTask,
-    Switch, TimerGrain,
+    Exploration, ExploredEnding, Grain, Livelock, ScheduleEvent, ScheduleStep, SearchLimit, SearchProgress,
+    Settings, StandingTask, Switch, TellStep, TimerGrain,
 };
 use esl_vm::host::{Captured, VirtualHost};
 use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Vm};
 pub use schedule::{Schedule, ScheduleError};
+pub use unseen::{UnseenChange, UnseenKind, unseen_changes};
+pub use verdict::{ExplorationScope, grains};
 
 use crate::error::Error;
 use crate::program::{self, Ended, Program};
@@ -120,28 +127,29 @@ fn side_by_side(others: Vec<Box<dyn FnOnce() + Send + '_>>, own: &mut dyn FnMut(
 /// As [`program::run`].
 pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result<Behaviour, Error> {
     let (mut machine, main, captured) = begin(program, &|_| Ok(()), false)?;
-    let outcome = machine.follow(settings, choices, &mut |_| {});
+    let outcome = machine.follow(settings, choices);
     let ended = program::end(&mut machine, main, outcome);
     Ok(Behaviour { ended, output: captured.output(), errors: captured.error() })
 }
 
 /// Follows a list of choices, on a machine that `prepare` has changed, to the end of the run if `ends`, else
-/// to the last of them. `told` is told of each choice that is not the first one, just before it is made.
+/// to the last of them. `told` is told of each choice that is not the first one, just before it is made, and of
+/// each use of a variable of the program, after it.
 ///
 /// # Errors
 /// As [`program::run`], and the errors of `prepare`.
 #[cfg(feature = "cli")]
-fn tell_switches(
+fn tell_steps(
     program: &Program,
     settings: &Settings,
     choices: &[u32],
     ends: bool,
     prepare: Prepare<'_>,
-    told: &mut dyn FnMut(Switch),
+    told: &mut TellStep<'_>,
 ) -> Result<(), Error> {
     let (mut machine, ..) = begin(program, prepare, false)?;
     if ends {
-        machine.follow(settings, choices, told);
+        machine.follow_and_tell(settings, choices, told);
     } else {
         machine.follow_to(settings, choices, told);
     }

@@ -111,18 +111,10 @@ impl Schedule {
         let machine = machine.ok_or(wrong(2, "a number, `-`, and a checksum in hexadecimal digits"))?;
         let program = hexadecimal(field(3, "program", "`program` and a checksum")?);
         let program = program.ok_or(wrong(3, "a checksum in hexadecimal digits"))?;
-        let grain = match field(4, "grain", "`grain`, and `changes`, `reads`, `variables` or `ticks`")? {
-            "changes" => Grain::Changes,
-            "reads" => Grain::Reads,
-            "variables" => Grain::Variables,
-            "ticks" => Grain::Ticks,
-            _ => return Err(wrong(4, "`changes`, `reads`, `variables` or `ticks`")),
-        };
-        let timers = match field(5, "timers", "`timers idle` or `timers any`")? {
-            "idle" => TimerGrain::Idle,
-            "any" => TimerGrain::Any,
-            _ => return Err(wrong(5, "`idle` or `any`")),
-        };
+        let grain = field(4, "grain", "`grain`, and `changes`, `reads`, `variables` or `ticks`")?;
+        let grain = Grain::from_name(grain).ok_or(wrong(4, "`changes`, `reads`, `variables` or `ticks`"))?;
+        let timers = field(5, "timers", "`timers idle` or `timers any`")?;
+        let timers = TimerGrain::from_name(timers).ok_or(wrong(5, "`idle` or `any`"))?;
         let turn = field(6, "turn", "`turn` and a number of ticks")?;
         let turn = turn.parse().ok().filter(|&turn| turn > 0).ok_or(wrong(6, "a number of ticks"))?;
         let words = field(7, "choices", "`choices` and numbers")?.split_ascii_whitespace();
@@ -158,16 +150,7 @@ impl Schedule {
 
 impl fmt::Display for Schedule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let grain = match self.grain {
-            Grain::Changes => "changes",
-            Grain::Reads => "reads",
-            Grain::Variables => "variables",
-            Grain::Ticks => "ticks",
-        };
-        let timers = match self.timers {
-            TimerGrain::Idle => "idle",
-            TimerGrain::Any => "any",
-        };
+        let (grain, timers) = (self.grain.name(), self.timers.name());
         let (epoch, library) = self.machine;
         write!(f, "{HEADER}\nmachine {epoch}-{library:08x}\nprogram {:08x}\n", self.program)?;
         write!(f, "grain {grain}\ntimers {timers}\nturn {}\nchoices", self.turn)?;

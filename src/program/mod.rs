@@ -85,6 +85,11 @@ impl Program {
         }
     }
 
+    /// Returns the compiled unit.
+    pub(crate) fn module(&self) -> &Module {
+        &self.module
+    }
+
     /// Returns the program as text, instruction by instruction.
     pub fn disassemble(&self) -> String {
         disasm::module(&self.module)

@@ -202,7 +202,7 @@ pub fn run_by(
     settings: &Settings,
     choices: &[u32],
 ) -> Result<Summary, Error> {
-    run_as(machine, program, |machine| machine.follow(settings, choices, &mut |_| {}))
+    run_as(machine, program, |machine| machine.follow(settings, choices))
 }
 
 /// Runs a program as [`run_in`] does, in portions of so many ticks, which changes nothing in the run, and

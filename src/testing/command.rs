@@ -11,8 +11,10 @@ use esl_compiler::diagnostic::{Format, Renderer};
 use esl_vm::host::Rights;
 use esl_vm::vm::Config;
 
-use super::{Setup, Test, Verdict, junit, list, run_test};
-use crate::command::{self, FAILED, NOT_COMPILED, ProgramFile, SUCCESS, StatusLine, USAGE, complain};
+use super::{Setup, Test, Verdict, junit, list, run_test, watch};
+use crate::command::{
+    self, FAILED, NO_TESTS, NOT_COMPILED, ProgramFile, SUCCESS, StatusLine, USAGE, complain,
+};
 use crate::coverage::{Coverage, CoverageReport, refuse_compiled};
 use crate::module_path::ModulePath;
 use crate::program::{self, Modules, Program};
@@ -22,6 +24,8 @@ use crate::program::{self, Modules, Program};
 pub struct Options {
     /// Only tests whose names contain this, in any case.
     pub filter: Option<String>,
+    /// Whether to run them again whenever a source changes.
+    pub is_watching: bool,
     /// Number of tests that run at the same time.
     pub jobs: usize,
     /// The one seed to run tests with, in place of their own.
@@ -67,34 +71,158 @@ pub(super) struct FinishedTest {
     pub(super) time: Duration,
 }
 
-/// Runs the tests of `files`, and prints what becomes of them. Returns the exit status.
-pub fn run(files: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
+/// Runs the tests of `paths`, files and folders, and prints what becomes of them; again and again if that is
+/// wanted. Returns the exit status.
+pub fn run(paths: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
+    if !options.is_watching {
+        return run_once(paths, library, options);
+    }
+    let folders = watch::folders(paths);
+    loop {
+        let before = watch::state(&folders);
+        run_once(paths, library, options);
+        println!("\nwaiting for a change of a source; Ctrl-C ends");
+        watch::wait(&folders, &before);
+        println!();
+    }
+}
+
+/// The files in which tests are looked for.
+struct TestFiles {
+    files: Vec<PathBuf>,
+    /// Those of them that were named.
+    named: Vec<PathBuf>,
+    /// Folders in which no file has the name of one with tests.
+    without: Vec<PathBuf>,
+}
+
+impl TestFiles {
+    /// Finds the files with tests in folders.
+    ///
+    /// # Errors
+    /// The exit status, after a message.
+    fn find(paths: &[PathBuf]) -> Result<TestFiles, u8> {
+        let mut found = TestFiles { files: Vec::new(), named: Vec::new(), without: Vec::new() };
+        let here = [PathBuf::from(".")];
+        for path in if paths.is_empty() { &here[..] } else { paths } {
+            if !path.is_dir() {
+                found.named.push(path.clone());
+                found.files.push(path.clone());
+                continue;
+            }
+            let tests: Vec<PathBuf> = command::sources_in(path)?
+                .into_iter()
+                .filter(|file| command::is_test_file(path, file))
+                .collect();
+            if tests.is_empty() {
+                found.without.push(path.clone());
+            }
+            found.files.extend(tests);
+        }
+        let mut seen = std::collections::HashSet::new();
+        found.files.retain(|file| seen.insert(file.clone()));
+        Ok(found)
+    }
+
+    /// Says where no test was found. `total` is the number of all tests, before they are selected.
+    fn complain_of_none(&self, filter: Option<&str>, total: usize) {
+        if let (Some(filter), true) = (filter, total > 0) {
+            let tests = if total == 1 { "test" } else { "tests" };
+            return complain(format_args!(
+                "no name of a test contains `{filter}`; there are {total} {tests} in all"
+            ));
+        }
+        for folder in &self.without {
+            complain(format_args!(
+                "no file with tests is in {}: their names are test.esl, *_test.esl or *-test.esl, or they are in a \
+                 folder named tests; name any other file itself",
+                folder.display()
+            ));
+        }
+    }
+}
+
+/// Runs the tests of files and folders once. Returns the exit status.
+fn run_once(paths: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
+    match TestFiles::find(paths).and_then(|files| run_files(&files, library, options)) {
+        Ok(status) | Err(status) => status,
+    }
+}
+
+/// Runs the tests of files. Returns the exit status.
+///
+/// # Errors
+/// The exit status, after a message.
+fn run_files(found: &TestFiles, library: &[PathBuf], options: &Options) -> Result<u8, u8> {
+    let files = &found.files;
     for output in [&options.junit, &options.coverage].into_iter().flatten() {
-        if let Err(status) = command::refuse_overwriting(output, files.iter().map(PathBuf::as_path)) {
-            return status;
-        }
+        command::refuse_overwriting(output, files.iter().map(PathBuf::as_path))?;
     }
-    let suites = match files
-        .iter()
-        .map(|file| suite(file, library, options))
-        .collect::<Result<Vec<Suite<'_>>, u8>>()
-    {
-        Ok(suites) => suites,
-        Err(status) => return status,
-    };
+    let suites =
+        files.iter().map(|file| suite(file, library, options)).collect::<Result<Vec<Suite<'_>>, u8>>()?;
     let mut runs = Vec::new();
+    let mut total = 0;
     for suite in &suites {
-        match list(&suite.program, &suite.setup) {
-            Ok(tests) => {
-                let wanted = tests.into_iter().filter(|test| is_wanted(test, options.filter.as_deref()));
-                runs.extend(wanted.map(|test| Run { suite, test, result: Mutex::default() }));
-            }
-            Err(error) => {
-                complain(format_args!("{} has no tests to run: {error}", suite.file.display()));
-                return FAILED;
-            }
+        let tests = list(&suite.program, &suite.setup).map_err(|error| {
+            complain(format_args!("{} has no tests to run: {error}", suite.file.display()));
+            FAILED
+        })?;
+        refuse_two_of_one_name(suite.file, &tests)?;
+        if tests.is_empty() && found.named.iter().any(|named| named == suite.file) {
+            complain(format_args!("{} has no tests: `deftest` defines one", suite.file.display()));
+        }
+        total += tests.len();
+        let wanted = tests.into_iter().filter(|test| is_wanted(test, options.filter.as_deref()));
+        runs.extend(wanted.map(|test| Run { suite, test, result: Mutex::default() }));
+    }
+    run_all(&runs, options);
+    let failed = runs.iter().filter(|run| has_failed(run)).count();
+    println!("{} passed, {failed} failed", runs.len() - failed);
+    if let Some(path) = &options.junit
+        && let Err(error) = std::fs::write(path, junit::report(&runs))
+    {
+        complain(format_args!("{} cannot be written: {error}", path.display()));
+        return Err(USAGE);
+    }
+    if let Some(path) = &options.coverage {
+        let mut report = CoverageReport::default();
+        for coverage in suites.iter().filter_map(|suite| suite.setup.coverage.as_ref()) {
+            report.merge(coverage.lock().unwrap_or_else(PoisonError::into_inner).report());
+        }
+        print!("\n{}", report.table());
+        if let Err(error) = std::fs::write(path, report.lcov()) {
+            complain(format_args!("{} cannot be written: {error}", path.display()));
+            return Err(USAGE);
         }
     }
+    if runs.is_empty() {
+        found.complain_of_none(options.filter.as_deref(), total);
+        return Ok(NO_TESTS);
+    }
+    Ok(if failed > 0 { FAILED } else { SUCCESS })
+}
+
+/// Refuses a file with two tests of one name, of which only one would count.
+///
+/// # Errors
+/// The exit status, after a message for each name.
+fn refuse_two_of_one_name(file: &Path, tests: &[Test]) -> Result<(), u8> {
+    let mut result = Ok(());
+    for (number, test) in tests.iter().enumerate() {
+        if let Some(first) = tests[..number].iter().find(|other| other.name == test.name) {
+            let (name, file) = (&test.name, file.display());
+            complain(format_args!(
+                "{file} has two tests `{name}`, at {} and at {}: rename one",
+                first.place, test.place
+            ));
+            result = Err(NOT_COMPILED);
+        }
+    }
+    result
+}
+
+/// Runs tests, several at a time, and prints what becomes of them in their order.
+fn run_all(runs: &[Run<'_>], options: &Options) {
     let next = AtomicUsize::new(0);
     // Number of the first test that was not told of.
     let told = Mutex::new(0);
@@ -107,33 +235,13 @@ pub fn run(files: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
                         let finished = finish(run, options);
                         *run.result.lock().unwrap_or_else(PoisonError::into_inner) = Some(finished);
                         let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
-                        status_line.beneath(|| tell(&runs, &mut told, options));
+                        status_line.beneath(|| tell(runs, &mut told, options));
                     }
                 });
             }
         });
     };
-    status_line.during(|| progress(&runs), run_all);
-    let failed = runs.iter().filter(|run| has_failed(run)).count();
-    println!("{} passed, {failed} failed", runs.len() - failed);
-    if let Some(path) = &options.junit
-        && let Err(error) = std::fs::write(path, junit::report(&runs))
-    {
-        complain(format_args!("{} cannot be written: {error}", path.display()));
-        return USAGE;
-    }
-    if let Some(path) = &options.coverage {
-        let mut report = CoverageReport::default();
-        for coverage in suites.iter().filter_map(|suite| suite.setup.coverage.as_ref()) {
-            report.merge(coverage.lock().unwrap_or_else(PoisonError::into_inner).report());
-        }
-        print!("\n{}", report.table());
-        if let Err(error) = std::fs::write(path, report.lcov()) {
-            complain(format_args!("{} cannot be written: {error}", path.display()));
-            return USAGE;
-        }
-    }
-    if failed > 0 { FAILED } else { SUCCESS }
+    status_line.during(|| progress(runs), run_all);
 }
 
 /// Says how many of the tests have ended, and which one goes on.
@@ -178,15 +286,17 @@ fn is_wanted(test: &Test, filter: Option<&str>) -> bool {
 
 fn has_failed(run: &Run<'_>) -> bool {
     let result = run.result.lock().unwrap_or_else(PoisonError::into_inner);
-    result.as_ref().is_none_or(|finished| finished.verdict != Verdict::Passed)
+    result.as_ref().is_none_or(|finished| matches!(finished.verdict, Verdict::Failed { .. }))
 }
 
 /// Runs a test with each of its seeds, until it fails.
 fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
     let start = Instant::now();
     let seeds = match options.seed {
+        // An exploration tries everything that a seed can pick.
+        _ if run.test.explores.is_some() => 0..1,
         Some(seed) => seed..seed.saturating_add(1),
-        None => 0..if run.test.explores { 1 } else { run.test.seeds },
+        None => 0..run.test.seeds,
     };
     let mut finished = FinishedTest { verdict: Verdict::Passed, seed: None, time: Duration::ZERO };
     for seed in seeds {
@@ -195,9 +305,14 @@ fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
             why: "it cannot be begun".into(),
             output: error.to_string(),
         });
-        if verdict != Verdict::Passed {
-            finished = FinishedTest { verdict, seed: (!run.test.explores).then_some(seed), ..finished };
-            break;
+        let seed = run.test.explores.is_none().then_some(seed);
+        match verdict {
+            Verdict::Passed => {}
+            Verdict::PassedAll(_) => finished = FinishedTest { verdict, ..finished },
+            Verdict::Failed { .. } => {
+                finished = FinishedTest { verdict, seed, ..finished };
+                break;
+            }
         }
     }
     FinishedTest { time: start.elapsed(), ..finished }
@@ -218,14 +333,14 @@ fn tell(runs: &[Run<'_>], told: &mut usize, options: &Options) {
 
 /// Returns the lines that say what became of a test.
 fn text(run: &Run<'_>, finished: &FinishedTest, options: &Options) -> String {
-    let Test { name, seeds, explores } = &run.test;
-    let Verdict::Failed { why, output } = &finished.verdict else {
-        let how = match options.seed {
-            None if *explores => ", all schedules".into(),
-            None if *seeds > 1 => format!(", {seeds} seeds"),
-            _ => String::new(),
-        };
-        return format!("  passed  {name}{how}\n");
+    let Test { name, seeds, .. } = &run.test;
+    let (why, output) = match &finished.verdict {
+        Verdict::Passed if options.seed.is_none() && *seeds > 1 => {
+            return format!("  passed  {name}, {seeds} seeds\n");
+        }
+        Verdict::Passed => return format!("  passed  {name}\n"),
+        Verdict::PassedAll(how) => return format!("  passed  {name}, {how}\n"),
+        Verdict::Failed { why, output } => (why, output),
     };
     let seed = finished.seed.map_or(String::new(), |seed| format!(", seed {seed}"));
     let mut text = format!("  FAILED  {name}{seed}: {why}\n");

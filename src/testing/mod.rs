@@ -23,12 +23,14 @@
 mod command;
 #[cfg(feature = "cli")]
 mod junit;
+#[cfg(feature = "cli")]
+mod watch;
 
 use std::cell::RefCell;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use esl_bytecode::datum::Datum;
-use esl_vm::explore::Settings;
+use esl_vm::explore::{Exploration, Grain, Settings, TimerGrain};
 use esl_vm::host::{Host, RealHost, Rights, VirtualHost};
 use esl_vm::task::TaskId;
 use esl_vm::value::Value;
@@ -40,6 +42,7 @@ pub use command::{Options, run};
 use crate::coverage::Coverage;
 use crate::data::Data;
 use crate::error::Error;
+use crate::explore::{ExplorationScope, grains};
 use crate::module_path::ModulePath;
 use crate::program::{self, Ended, Program};
 
@@ -78,8 +81,21 @@ pub struct Test {
     pub name: String,
     /// Number of seeds to run it with.
     pub seeds: u64,
-    /// Whether to run it under all schedules.
-    pub explores: bool,
+    /// How to run it under all schedules, if that is what it is for.
+    pub explores: Option<ExploreOptions>,
+    /// Where its body begins, as `file:line:column`; empty if that is not known.
+    pub place: String,
+}
+
+/// How to run a test under all schedules; by default as `eslvm explore` does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ExploreOptions {
+    /// Where points are.
+    pub grain: Option<Grain>,
+    /// When timers fire.
+    pub timers: Option<TimerGrain>,
+    /// Most states.
+    pub states: Option<usize>,
 }
 
 /// What became of a test.
@@ -87,6 +103,8 @@ pub struct Test {
 pub enum Verdict {
     /// All its checks held.
     Passed,
+    /// All its checks held under all schedules, as far as these words say.
+    PassedAll(String),
     /// It failed.
     Failed {
         /// Why, in a few words.
@@ -131,14 +149,33 @@ pub fn list(program: &Program, setup: &Setup) -> Result<Vec<Test>, Error> {
     let tests = machine.export(values.first().copied().unwrap_or(Value::NIL))?;
     let tests = Data::from_datum(&tests);
     let read = |test: &Data| match test.as_list() {
-        Some([Data::String(name), Data::Integer(seeds), explores]) => Some(Test {
+        Some([Data::String(name), Data::Integer(seeds), explores, Data::String(place)]) => Some(Test {
             name: name.clone(),
             seeds: u64::try_from(*seeds).ok()?,
-            explores: explores.is_true(),
+            explores: explore_options(explores),
+            place: place.clone(),
         }),
         _ => None,
     };
     Ok(tests.as_list().unwrap_or_default().iter().filter_map(read).collect())
+}
+
+/// Returns how a test is explored, as the library has noted it.
+fn explore_options(noted: &Data) -> Option<ExploreOptions> {
+    let Some([grain, timers, states]) = noted.as_list() else { return None };
+    let name = |data: &Data| match data {
+        Data::String(name) => Some(name.clone()),
+        _ => None,
+    };
+    let states = match states {
+        Data::Integer(states) => Some(usize::try_from(*states).unwrap_or(usize::MAX)),
+        _ => None,
+    };
+    Some(ExploreOptions {
+        grain: name(grain).and_then(|name| Grain::from_name(&name)),
+        timers: name(timers).and_then(|name| TimerGrain::from_name(&name)),
+        states,
+    })
 }
 
 /// Returns a machine that is about to run a test, and its main task.
@@ -164,8 +201,8 @@ fn begin(
 /// # Errors
 /// [`Error::NoMemory`] or [`Error::Refused`], if it cannot be begun.
 pub fn run_test(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Result<Verdict, Error> {
-    if test.explores {
-        return explore(program, test, setup);
+    if let Some(options) = test.explores {
+        return explore(program, test, options, setup);
     }
     let written = Written::default();
     let (mut machine, main) = begin(program, test, seed, setup, Box::new(written.host(setup)))?;
@@ -176,8 +213,55 @@ pub fn run_test(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Res
     Ok(verdict(ended, || written.text()))
 }
 
-/// Runs a test under all schedules.
-fn explore(program: &Program, test: &Test, setup: &Setup) -> Result<Verdict, Error> {
+/// Runs a test under all schedules: at the grain that is asked for, or at those that show most.
+fn explore(program: &Program, test: &Test, options: ExploreOptions, setup: &Setup) -> Result<Verdict, Error> {
+    let states = options.states.unwrap_or(Settings::default().states);
+    let timers = options.timers.unwrap_or_default();
+    let mut verdict = Verdict::Passed;
+    for grain in grains(program, options.grain) {
+        let settings = Settings { grain, timers, states, output: false, ..Settings::default() };
+        let found = explore_at(program, test, &settings, setup)?;
+        let scope = ExplorationScope::new(program, &settings, &found);
+        let failed = |why: &str, output| Verdict::Failed { why: format!("{why} ({scope})"), output };
+        let badly = found.endings.into_iter().find(|ending| ending.what != Verdict::Passed);
+        verdict = match badly.map(|ending| ending.what) {
+            Some(Verdict::Failed { why, output }) => failed(&format!("under a schedule, {why}"), output),
+            _ if found.endless.is_some() => failed("a schedule leads to where it never ends", String::new()),
+            _ if found.livelock.is_some() => {
+                failed("tasks can go on for ever, though each has its turns", String::new())
+            }
+            _ if found.limit.is_some() => {
+                failed("not proved: schedules are left that were not tried", unproved(&verdict))
+            }
+            _ => Verdict::PassedAll(match scope.why_not_complete() {
+                None => format!("all schedules, {scope}"),
+                Some(why) => format!("all schedules, {scope}; not proved: {why}"),
+            }),
+        };
+        if matches!(verdict, Verdict::Failed { .. }) {
+            break;
+        }
+    }
+    Ok(verdict)
+}
+
+/// Says of a test that is not proved at one grain what is known of it at the one before.
+fn unproved(before: &Verdict) -> String {
+    match before {
+        Verdict::PassedAll(how) => format!(
+            "before: passed, {how}\nto be content with that, say :explore (:grain variables); to try more, :states\n"
+        ),
+        _ => String::new(),
+    }
+}
+
+/// Runs a test under all schedules, with these settings.
+fn explore_at(
+    program: &Program,
+    test: &Test,
+    settings: &Settings,
+    setup: &Setup,
+) -> Result<Exploration<Verdict>, Error> {
     let present = RefCell::new(None);
     let begin = || {
         let host = VirtualHost::new();
@@ -188,30 +272,12 @@ fn explore(program: &Program, test: &Test, setup: &Setup) -> Result<Verdict, Err
         present.replace(Some((main, captured)));
         Ok::<Vm, Error>(machine)
     };
-    let found = esl_vm::explore::explore(&Settings::default(), begin, |machine, outcome| {
+    esl_vm::explore::explore(settings, begin, |machine, outcome| {
         let present = present.borrow();
         let (main, captured) = present.as_ref().expect("a machine that has run was begun");
         let ended = program::end(machine, *main, outcome);
         setup.note_passages(machine);
         verdict(ended, || captured.output() + &captured.error())
-    })?;
-    let failed = found.endings.into_iter().find(|ending| ending.what != Verdict::Passed);
-    Ok(match failed.map(|ending| ending.what) {
-        Some(Verdict::Failed { why, output }) => {
-            Verdict::Failed { why: format!("under one of {} schedules, {why}", found.runs), output }
-        }
-        _ if found.endless.is_some() => {
-            Verdict::Failed { why: "a schedule leads to where it never ends".into(), output: String::new() }
-        }
-        _ if found.livelock.is_some() => Verdict::Failed {
-            why: "tasks can go on for ever, though each has its turns".into(),
-            output: String::new(),
-        },
-        _ if found.limit.is_some() => Verdict::Failed {
-            why: format!("after {} states there are schedules left that were not tried", found.states),
-            output: String::new(),
-        },
-        _ => Verdict::Passed,
     })
 }
 

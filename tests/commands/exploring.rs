@@ -28,12 +28,10 @@ fn a_finding_is_told_by_its_switches_and_repeated_by_its_schedule() {
     let (status, output, errors) = run(&folder, &["explore", "--timeline", "lost.svg", "lost.esl"]);
     assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
     assert!(output.starts_with("finding 1: no task can ever run again\n  1. task "), "{output}");
-    assert!(
-        output.contains("task RADIO stops before lost.esl:7:12: (wait-for-event *taken*))))\n"),
-        "{output}"
-    );
+    assert!(output.contains("\n     task RADIO reads *PICTURE* = NIL\n"), "{output}");
+    assert!(output.contains("task RADIO stops before lost.esl:7:12: (wait-for-event *taken*)\n"), "{output}");
     assert!(output.contains("\n  again: eslvm run --schedule lost-1.schedule lost.esl\n"), "{output}");
-    assert!(output.contains("\ncomplete: findings: 1 ("), "{output}");
+    assert!(output.contains("\nviolation: findings: 1 (grain variables, timers idle; "), "{output}");
     let picture = std::fs::read_to_string(folder.path().join("lost.svg")).expect("the timeline is drawn");
     assert!(picture.contains("task RADIO"), "{picture}");
     let (status, _, errors) = run(&folder, &["run", "--schedule", "lost-1.schedule", "lost.esl"]);
@@ -112,7 +110,10 @@ fn what_always_has_to_hold_is_checked_in_every_state() {
     folder.file("mended.esl", &mended);
     let (status, output, errors) = run(&folder, &["explore", "mended.esl"]);
     assert_eq!(status, Some(0), "{output}{errors}");
-    assert!(output.starts_with("complete: no schedule ends badly ("), "{output}");
+    assert!(
+        output.starts_with("complete: no schedule ends badly (grain variables, timers idle; "),
+        "{output}"
+    );
 }
 
 #[test]
@@ -127,6 +128,14 @@ fn figures_and_findings_are_json_on_request() {
     assert_eq!(lines[0]["schedule"], "lost-1.schedule");
     assert_eq!(lines[0]["switches"].as_array().map(Vec::len), Some(2), "{output}");
     assert_eq!((&lines[1]["findings"], &lines[1]["limit"]), (&1.into(), &serde_json::Value::Null));
+    let scope = ["verdict", "grain", "timers"].map(|key| lines[1][key].as_str().unwrap_or_default());
+    assert_eq!(scope, ["violation", "variables", "idle"]);
+    let steps = lines[0]["steps"].as_array().expect("the steps are told");
+    let read = steps.iter().find(|step| step["kind"] == "read").expect("the radio reads");
+    assert_eq!(
+        (&read["task"], &read["variable"], &read["value"], &read["time"]),
+        (&"task RADIO".into(), &"*PICTURE*".into(), &"NIL".into(), &0.0.into())
+    );
 }
 
 #[test]
@@ -166,7 +175,7 @@ fn timers_may_end_at_any_point() {
     folder.file("hurry.esl", text);
     let (status, output, errors) = run(&folder, &["explore", "hurry.esl"]);
     assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
-    assert!(output.contains("timers that end before others have done their work (--timers any)"), "{output}");
+    assert!(output.ends_with("\nnot tried: timers that end early (--timers any)\n"), "{output}");
     let (status, output, _) = run(&folder, &["explore", "--timers", "any", "hurry.esl"]);
     assert_eq!(status, Some(1), "{output}");
     assert!(output.starts_with("finding 1: a failure leaves the main task\n"), "{output}");
@@ -195,7 +204,8 @@ fn timers_may_end_at_any_point() {
 fn memory_bounds_an_exploration() {
     let folder = Folder::new("exploring-memory");
     folder.file("lost.esl", LOST_SIGNAL);
-    let figures = |output: &str| output.lines().find(|line| line.starts_with("complete")).map(str::to_string);
+    let figures =
+        |output: &str| output.lines().find(|line| line.starts_with("violation")).map(str::to_string);
     let (_, much, _) = run(&folder, &["explore", "lost.esl"]);
     let (status, little, errors) = run(&folder, &["explore", "--memory", "4M", "lost.esl"]);
     assert_eq!((status, errors.as_str(), figures(&little)), (Some(1), "", figures(&much)));
@@ -227,32 +237,85 @@ fn threads_find_the_same_as_one() {
     assert_eq!(one, found("5"));
 }
 
-/// What only a switch at a tick can show, after a use of a variable or anywhere.
+/// A lost update is found without an option, and is not hidden by a coarser grain.
 #[test]
-fn at_ticks_shared_variables_are_seen() {
-    let folder = Folder::new("exploring-ticks");
+fn a_lost_update_of_a_variable_is_found_by_default() {
+    let folder = Folder::new("exploring-lost-update");
     let text = "(defvar *count* 0)
-(defun twice (n) (+ n n))
-(task-net
-  (one (setq *count* (+ *count* (twice (twice 1)))))
-  (two (setq *count* (+ *count* (twice (twice 2))))))
-(unless (= *count* 12) (exit 9))
+(defun inc (n) (+ n 1))
+(defun bump () (let ((old *count*)) (setq *count* (inc old))))
+(task-net (one (bump)) (two (bump)))
+(unless (= *count* 2) (exit 9))
 ";
     folder.file("count.esl", text);
-    let (status, output, errors) = run(&folder, &["explore", "count.esl"]);
-    assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
-    assert!(output.contains("Not seen: changes of variables (--grain variables), and of slots"), "{output}");
-    for grain in ["variables", "ticks"] {
-        let (status, output, errors) = run(&folder, &["explore", "--grain", grain, "count.esl"]);
+    for options in [&[][..], &["--grain", "variables"], &["--grain", "ticks"]] {
+        let (status, output, errors) = run(&folder, &[&["explore"], options, &["count.esl"]].concat());
         assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
         assert!(output.starts_with("finding 1: the program ends with status 9\n"), "{output}");
-        assert_eq!(
-            output.contains("Not seen: changes of slots and tables"),
-            grain == "variables",
-            "{output}"
-        );
+        for told in ["reads *COUNT* = 0\n", "task ONE sets *COUNT* to 1\n", "task TWO sets *COUNT* to 1\n"] {
+            assert!(output.contains(told), "{told} is not in\n{output}");
+        }
         assert_eq!(run(&folder, &["run", "--schedule", "count-1.schedule", "count.esl"]).0, Some(9));
     }
+    let variables = "changes of special variables (count.esl:3:";
+    for (grain, what) in
+        [("changes", format!("what tasks look at, {variables}")), ("reads", variables.into())]
+    {
+        let (status, output, errors) = run(&folder, &["explore", "--grain", grain, "count.esl"]);
+        assert_eq!((status, errors.as_str()), (Some(7), ""), "{output}");
+        let said = format!("bounded, not proved: grain {grain} does not see {what}");
+        assert!(output.starts_with(&said) && output.contains(", grain variables does; "), "{output}");
+    }
+}
+
+/// Tasks that share an object that grain `variables` does not see: the finer grain is tried as well, and the
+/// coarser one alone claims no proof.
+#[test]
+fn a_lost_update_of_an_object_is_found_by_default() {
+    let folder = Folder::new("exploring-objects");
+    // No special variable leads to the objects.
+    let places = [
+        ("slots", "(tank (make-tank :level 0))", "(tank-level tank)"),
+        ("elements of arrays", "(levels (vector 0))", "(svref levels 0)"),
+        ("pairs", "(levels (list 0))", "(car levels)"),
+        (
+            "hash tables",
+            "(levels (let ((it (make-hash-table))) (setf (gethash 1 it) 0) it))",
+            "(gethash 1 levels)",
+        ),
+        ("properties of symbols", "(level (progn (setf (get 'tank 'level) 0) 'level))", "(get 'tank level)"),
+        ("variables of closures", "(level 0)", "level"),
+    ];
+    for (what, binding, place) in places {
+        let update = format!("(setf {place} (inc {place}))");
+        let text = |update: &str| {
+            format!(
+                "(defstruct tank level)\n(defun inc (n) (+ n 1))\n(let ({binding})\n  \
+                 (task-net (one {update}) (two {update}))\n  (unless (= {place} 2) (exit 9)))\n"
+            )
+        };
+        folder.file("tank.esl", text(&update));
+        let (status, output, errors) = run(&folder, &["explore", "tank.esl"]);
+        assert_eq!((status, errors.as_str()), (Some(1), ""), "{what}: {output}");
+        assert!(output.contains("\nviolation: findings: 1 (grain ticks, timers idle; "), "{what}: {output}");
+        let (status, output, _) = run(&folder, &["explore", "--grain", "variables", "tank.esl"]);
+        assert_eq!(status, Some(7), "{what}: {output}");
+        let said = "bounded, not proved: grain variables does not see changes of ";
+        assert!(
+            output.starts_with(said) && output.contains(&format!("{what} (tank.esl:")),
+            "{what}: {output}"
+        );
+        assert!(output.contains(", grain ticks does; no schedule so far ends badly ("), "{what}: {output}");
+        // In a critical section nobody comes in between, which grain `ticks` proves.
+        folder.file("tank.esl", text(&format!("(without-interrupts {update})")));
+        let (status, output, errors) = run(&folder, &["explore", "tank.esl"]);
+        assert_eq!((status, errors.as_str()), (Some(0), ""), "{what}: {output}");
+        assert!(output.starts_with("complete: no schedule ends badly (grain ticks, "), "{what}: {output}");
+    }
+    // When the finer grain is cut off, the verdict says so, and what the coarser one has shown.
+    let (status, output, _) = run(&folder, &["explore", "--states", "50", "tank.esl"]);
+    assert_eq!(status, Some(7), "{output}");
+    assert!(output.starts_with("bounded, not proved: the limit of states is reached; "), "{output}");
 }
 
 /// A finding is recorded, and gone through forwards and backwards.

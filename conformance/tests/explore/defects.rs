@@ -35,7 +35,7 @@ fn check_locks(text: &str, expected: &[&str], changes: &[TextChange]) {
 /// schedule.
 fn check_that_it_shows(text: &str, expected: &[&str], changes: &[TextChange]) {
     let defect = changed_functions(changes);
-    let settings = Settings { states: 50_000, ..Settings::default() };
+    let settings = Settings { grain: Grain::Changes, states: 50_000, ..Settings::default() };
     let prepare = |machine: &mut Vm| defect.put_into(machine);
     let found = explore_with(&compile(text), &settings, &prepare).expect("the program can start");
     let is_well = |ending: &esl::explore::ExploredEnding<esl::explore::Behaviour>| {

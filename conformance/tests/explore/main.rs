@@ -236,7 +236,7 @@ const POLITE: &str = "(defvar *left* nil)
 #[test]
 fn a_livelock_goes_round_as_often_as_one_likes() {
     let program = compile(POLITE);
-    let settings = Settings { output: false, ..Settings::default() };
+    let settings = Settings { grain: Grain::Changes, output: false, ..Settings::default() };
     let found = explore(&program, &settings).expect("it runs");
     assert!(found.endless.is_none() && found.limit.is_none(), "{found:?}");
     let Livelock { choices, lap } = found.livelock.expect("both can be polite for ever");

@@ -36,14 +36,13 @@ pub(crate) fn run_explore(
             compiled.program.ok_or(NOT_COMPILED)?
         }
     };
-    let grain = match options.grain {
+    let grain = options.grain.map(|grain| match grain {
         GrainChoice::Changes => explore::Grain::Changes,
         GrainChoice::Reads => explore::Grain::Reads,
         GrainChoice::Variables => explore::Grain::Variables,
         GrainChoice::Ticks => explore::Grain::Ticks,
-    };
+    });
     let settings = explore::Settings {
-        grain,
         timers: match options.timers {
             TimersChoice::Idle => explore::TimerGrain::Idle,
             TimersChoice::Any => explore::TimerGrain::Any,
@@ -62,6 +61,6 @@ pub(crate) fn run_explore(
         &program,
         file,
         &path,
-        &explore::ExplorationOptions { settings, jobs, time, timeline, json, is_quiet },
+        &explore::ExplorationOptions { settings, grain, jobs, time, timeline, json, is_quiet },
     ))
 }

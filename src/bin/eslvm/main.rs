@@ -11,7 +11,7 @@ mod run;
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser};
+use clap::CommandFactory;
 use esl::Config;
 use esl::command;
 use esl::host::RealHost;
@@ -33,11 +33,30 @@ fn raise_limit_of_descriptors() {
     _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
 }
 
+/// Words in place of a subcommand, and what to type.
+const HABITS: command::Habits = &[
+    ("exec", "eslvm run"),
+    ("start", "eslvm run"),
+    ("debug", "eslvm replay"),
+    ("shell", "eslvm repl"),
+    ("check", "eslc check"),
+    ("lint", "eslc check"),
+    ("compile", "eslc compile"),
+    ("build", "eslc compile"),
+    ("format", "eslc format"),
+    ("fmt", "eslc format"),
+    ("new", "eslc new"),
+    ("init", "eslc new"),
+    ("lsp", "eslc lsp"),
+    ("expand", "eslc expand"),
+    ("disasm", "eslc disasm"),
+];
+
 fn main() -> ExitCode {
     #[cfg(unix)]
     raise_limit_of_descriptors();
     esl_vm::allocator::return_large_blocks();
-    let status = match Eslvm::parse().action {
+    let status = match command::parse::<Eslvm>("eslvm run", HABITS).action {
         EslvmAction::Run {
             mut options,
             compiling: CompilingOptions { modules, quiet: is_quiet },
@@ -81,6 +100,7 @@ fn main() -> ExitCode {
         EslvmAction::Replay { options } => replay::run_command(&options),
         EslvmAction::Test {
             filter,
+            watch,
             jobs,
             seed,
             junit,
@@ -98,7 +118,17 @@ fn main() -> ExitCode {
                 testing::run(
                     &sources,
                     &modules.library,
-                    &testing::Options { filter, jobs, seed, junit, coverage, config, rights, is_quiet },
+                    &testing::Options {
+                        filter,
+                        is_watching: watch,
+                        jobs,
+                        seed,
+                        junit,
+                        coverage,
+                        config,
+                        rights,
+                        is_quiet,
+                    },
                 )
             })
         }

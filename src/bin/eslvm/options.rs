@@ -112,11 +112,14 @@ pub(crate) enum EslvmAction {
     ///
     /// Each test (`deftest`) runs in a machine of its own, whose clock is virtual. Exit status: 0 all
     /// passed; 1 a test failed; 2 wrong usage, or a file that cannot be read or written; 3 a file does not
-    /// compile or is refused.
+    /// compile or is refused, or has two tests of one name; 5 there was no test to run.
     Test {
         /// Only tests whose names contain this word, in any case
         #[arg(long, value_name = "WORD")]
         filter: Option<String>,
+        /// Run the tests again whenever a source beside them changes, until the command is interrupted
+        #[arg(long, conflicts_with_all = ["junit", "coverage"])]
+        watch: bool,
         /// Number of tests that run at the same time, by default that of the processors
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
         jobs: Option<u16>,
@@ -140,8 +143,9 @@ pub(crate) enum EslvmAction {
         compiling: CompilingOptions,
         #[command(flatten)]
         rights: RightsOptions,
-        /// Source or bytecode files
-        #[arg(required = true, value_name = "FILE")]
+        /// Source or bytecode files, or folders, of which those sources are meant that are named `test.esl`,
+        /// `tests.esl`, `*_test.esl` or `*-test.esl`, or are in a folder `tests`; by default this folder
+        #[arg(value_name = "FILE")]
         sources: Vec<PathBuf>,
     },
     /// Run a program under all schedules
@@ -150,7 +154,7 @@ pub(crate) enum EslvmAction {
     /// badly: by a deadlock, a failure of the main task, a status other than 0. Writes each as a schedule,
     /// which `eslvm run --schedule` repeats. Exit status: 0 no schedule ends badly; 1 one does; 2 wrong
     /// usage, or a file that cannot be read or written; 3 the program does not compile or is refused; 7
-    /// none was found, and not all were tried.
+    /// none was found, which is no proof: not all were tried, or the grain does not see all that tasks share.
     Explore {
         #[command(flatten)]
         options: ExploreArguments,
@@ -289,9 +293,10 @@ impl MachineOptions {
 
 #[derive(Args)]
 pub(crate) struct ExploreArguments {
-    /// Where a task may have to let others go first; a finer grain sees more, and has more states
-    #[arg(long, value_enum, default_value = "changes")]
-    pub(crate) grain: GrainChoice,
+    /// Where a task may have to let others go first; a finer grain sees more, and has more states. By default
+    /// it is variables, and then ticks if the program changes what variables does not see
+    #[arg(long, value_enum)]
+    pub(crate) grain: Option<GrainChoice>,
     /// Number of threads, by default that of the processors; the findings do not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) jobs: Option<u16>,

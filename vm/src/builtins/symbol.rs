@@ -129,7 +129,12 @@ pub(super) fn symbol_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let object = symbol_object(vm, arguments[0])?;
     vm.scheduler.points.note_shown();
     match vm.symbol_value(object) {
-        Some(value) => Ok(value),
+        Some(value) => {
+            if vm.scheduler.points.uses.is_some() {
+                vm.tell_use(object, value, false);
+            }
+            Ok(value)
+        }
         None => vm.exchange.raise(Raised::UnboundVariable(arguments[0])),
     }
 }

@@ -19,9 +19,10 @@
 //! [`Grain::Reads`] also before it looks at what others do: before it counts signals, asks what became of a
 //! task, or queries the database; with [`Grain::Variables`] also at a tick after it has used a special
 //! variable of the program, and with [`Grain::Ticks`] at every tick. Nothing between two points is visible to
-//! other tasks by these means, so every schedule of the machine behaves like one of those explored. State
-//! shared in other ways (variables, tables, structures) is not considered: programs protect it by critical
-//! sections, which are one step each.
+//! other tasks by these means, so every schedule of the machine behaves like one of those explored. Places that
+//! tasks share in other ways (slots, elements, pairs, tables, variables that closures share) are seen only with
+//! [`Grain::Ticks`], unless all uses of them are in critical sections, which are one step each. A caller that
+//! calls a search complete has to know that the program has none.
 //! Where a program itself chooses, by `choose`, each way is tried.
 //! A task that reaches no point is stopped after [`Settings::turn`] ticks.
 //!
@@ -69,7 +70,7 @@ use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
 use crew::{Crew, LoneCrew, RunPlace, ThreadCrew};
-pub use point::{FollowedRun, StandingTask, Switch};
+pub use point::{FollowedRun, ScheduleEvent, ScheduleStep, StandingTask, Switch, TellStep};
 use search::Search;
 use trace::{MergePlace, Merged, Merging, TraceEnd};
 
@@ -81,6 +82,24 @@ pub enum TimerGrain {
     Idle,
     /// At any point: what tasks do may take as long as the first timer takes.
     Any,
+}
+
+impl TimerGrain {
+    /// Both.
+    pub const ALL: [TimerGrain; 2] = [TimerGrain::Idle, TimerGrain::Any];
+
+    /// Returns the name, as commands, tests and schedules write it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            TimerGrain::Idle => "idle",
+            TimerGrain::Any => "any",
+        }
+    }
+
+    /// Returns the one of this name.
+    pub fn from_name(name: &str) -> Option<TimerGrain> {
+        TimerGrain::ALL.into_iter().find(|timers| timers.name() == name)
+    }
 }
 
 /// Settings of an exploration.
@@ -111,7 +130,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Settings {
         Settings {
-            grain: Grain::Changes,
+            grain: Grain::Variables,
             timers: TimerGrain::Idle,
             turn: 100_000,
             states: 1_000_000,

@@ -1,14 +1,15 @@
 //! Running from point to point.
 
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE};
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 use smallvec::SmallVec;
 
 use super::{Settings, TimerGrain};
+use crate::describe::describe;
 use crate::heap::Kind;
 use crate::heap::layout::SymbolObject;
 use crate::report::{program_place, task_label};
 use crate::run::{self, RunOutcome};
-use crate::schedule::{Choices, Due, Grain};
+use crate::schedule::{Choices, Due, Grain, VariableUse};
 use crate::task::{TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -65,6 +66,36 @@ pub enum Switch {
         form: u32,
     },
 }
+
+/// What happens in a schedule, as it is told.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScheduleStep {
+    /// Time of the machine's clock, in nanoseconds.
+    pub time: u64,
+    /// What happens.
+    pub event: ScheduleEvent,
+}
+
+/// A choice of a schedule, or what a task does between two of them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ScheduleEvent {
+    /// A choice other than the first one that was possible.
+    Switch(Switch),
+    /// A task has read or set a special variable of the program that it has not bound.
+    Use {
+        /// What reports call the task.
+        task: String,
+        /// Name of the variable.
+        variable: String,
+        /// The value, as a short text.
+        value: String,
+        /// Whether the variable was set.
+        is_set: bool,
+    },
+}
+
+/// Is told what happens in a schedule.
+pub type TellStep<'a> = dyn FnMut(ScheduleStep) + 'a;
 
 /// A task at a place of the program.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -125,19 +156,24 @@ impl Vm {
     }
 
     /// Runs the program from point to point along a list of choices found by [`super::explore`] with the same
-    /// settings; beyond the end of the list, the first choice is taken. `told` is told of the other choices.
-    pub fn follow(
+    /// settings; beyond the end of the list, the first choice is taken.
+    pub fn follow(&mut self, settings: &Settings, choices: &[u32]) -> RunOutcome {
+        follow(self, settings, choices, true, None).unwrap_or(RunOutcome::Done)
+    }
+
+    /// As [`Vm::follow`]; `told` is told of the choices other than the first, and of the uses of variables.
+    pub fn follow_and_tell(
         &mut self,
         settings: &Settings,
         choices: &[u32],
-        told: &mut dyn FnMut(Switch),
+        told: &mut TellStep<'_>,
     ) -> RunOutcome {
-        follow(self, settings, choices, true, told).unwrap_or(RunOutcome::Done)
+        follow(self, settings, choices, true, Some(told)).unwrap_or(RunOutcome::Done)
     }
 
-    /// As [`Vm::follow`], no further than the last of the choices: for a schedule that does not end.
-    pub fn follow_to(&mut self, settings: &Settings, choices: &[u32], told: &mut dyn FnMut(Switch)) {
-        follow(self, settings, choices, false, told);
+    /// As [`Vm::follow_and_tell`], no further than the last of the choices: for a schedule that does not end.
+    pub fn follow_to(&mut self, settings: &Settings, choices: &[u32], told: &mut TellStep<'_>) {
+        follow(self, settings, choices, false, Some(told));
     }
 }
 
@@ -147,24 +183,71 @@ fn follow(
     settings: &Settings,
     choices: &[u32],
     goes_beyond: bool,
-    told: &mut dyn FnMut(Switch),
+    mut told: Option<&mut TellStep<'_>>,
 ) -> Option<RunOutcome> {
     explore_by(vm, settings);
+    vm.scheduler.points.uses = told.is_some().then(Vec::new);
     let mut choices = choices.iter().copied();
+    let mut watched = 0;
     let mut next = |vm: &mut Vm, runnable: Runnable<'_>| {
+        if let Some(told) = &mut told {
+            tell_uses(vm, *told);
+            // Uses of variables are told at each grain.
+            if watched != vm.world.symbol_count() {
+                watch_variables(vm);
+                watched = vm.world.symbol_count();
+            }
+        }
         if !goes_beyond && choices.len() == 0 {
             return None;
         }
         let choice = if runnable.count() > 1 { choices.next().unwrap_or(0) } else { 0 };
-        if choice > 0 {
-            told(switch(vm, runnable, choice));
+        if choice > 0
+            && let Some(told) = &mut told
+        {
+            let event = ScheduleEvent::Switch(switch(vm, runnable, choice));
+            told(ScheduleStep { time: vm.scheduler.clock.now, event });
         }
         Some(choice)
     };
     let mut run = PointRun::begin(vm, settings);
     let outcome = run.go_on(vm, u64::MAX, &mut |vm, _, runnable| next(vm, runnable));
+    if let Some(told) = told {
+        tell_uses(vm, told);
+    }
+    vm.scheduler.points.uses = None;
     vm.end_following();
     outcome
+}
+
+/// Tells of the uses of the program's variables since the last point.
+fn tell_uses(vm: &mut Vm, told: &mut TellStep<'_>) {
+    let uses = vm.scheduler.points.uses.as_mut().map(std::mem::take).unwrap_or_default();
+    if uses.is_empty() {
+        return;
+    }
+    let mut is_of_program = vec![false; uses.len()];
+    vm.world.each_symbol(&mut |symbol, object| {
+        for (used, is_of_program) in uses.iter().zip(&mut is_of_program) {
+            // Names that begin with `%` are those of the library's machinery, such as the object of a fluent.
+            *is_of_program |=
+                used.symbol == object && !is_of_library(symbol) && !symbol.name().starts_with('%');
+        }
+    });
+    for (VariableUse { task, symbol, value, is_set }, is_of_program) in uses.into_iter().zip(is_of_program) {
+        if is_of_program {
+            let object = vm.scheduler.tasks.iter().find(|other| other.number == task);
+            let object = object.map_or(Value::NIL, |task| task.object);
+            let (task, variable) = (task_label(vm, object), describe(&vm.heap, symbol));
+            let event = ScheduleEvent::Use { task, variable, value, is_set };
+            told(ScheduleStep { time: vm.scheduler.clock.now, event });
+        }
+    }
+}
+
+/// Returns whether a symbol belongs to the library.
+fn is_of_library(symbol: &Symbol) -> bool {
+    [CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE].iter().any(|name| symbol.is_in(name))
 }
 
 /// Describes a choice that is not the first.
@@ -356,8 +439,9 @@ impl PointRun {
 fn watch_variables(vm: &mut Vm) {
     let mut watched = Vec::new();
     vm.world.each_symbol(&mut |symbol, object| {
-        let is_of_library = [CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE].iter().any(|name| symbol.is_in(name));
-        if !is_of_library && vm.heap.symbol(object).is_some_and(|cell| cell.header.flags & NOT_WATCHED == 0) {
+        if !is_of_library(symbol)
+            && vm.heap.symbol(object).is_some_and(|cell| cell.header.flags & NOT_WATCHED == 0)
+        {
             watched.push(object);
         }
     });

@@ -98,7 +98,7 @@ fn all_orders_are_found() {
     assert!(found.endings[0].choices.iter().all(|&choice| choice == 0), "{found:?}");
     for ending in &found.endings {
         let mut vm = machine(&[&first, &second]);
-        assert_eq!(vm.follow(&Settings::default(), &ending.choices, &mut |_| {}), RunOutcome::Done);
+        assert_eq!(vm.follow(&Settings::default(), &ending.choices), RunOutcome::Done);
         let symbol = vm.world.find(&Symbol::esl("F")).unwrap();
         assert_eq!(vm.describe(vm.symbol_value(symbol).unwrap()), ending.what.1);
     }

@@ -4,10 +4,12 @@
 //! serves, `base` is the running frame's, and what the verifier proved holds (V1 to V14).
 
 use super::{Signal, code_of, constant, failure, word_at};
+use crate::describe::describe;
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::{Exit, Raised};
+use crate::schedule::VariableUse;
 use crate::shape::{Shape, Sort};
-use crate::task::Binding;
+use crate::task::{Binding, TaskNumber};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -22,7 +24,11 @@ pub(super) unsafe fn bound_value(vm: &mut Vm, symbol: Value) -> Value {
     let bindings = vm.scheduler.running.as_ref().map(|task| &task.control.bindings);
     // SAFETY: by the contract this is a live Symbol.
     let global = unsafe { (*symbol.object_ptr().cast::<SymbolObject>()).value };
-    bindings.and_then(|bindings| bindings.get(symbol)).unwrap_or(global)
+    let bound = bindings.and_then(|bindings| bindings.get(symbol));
+    if bound.is_none() && vm.scheduler.points.uses.is_some() {
+        vm.tell_use(symbol, global, false);
+    }
+    bound.unwrap_or(global)
 }
 
 /// `symbol-value` of a symbol that has no value.
@@ -141,9 +147,22 @@ impl Vm {
                 *place = value;
                 return Ok(());
             }
+            if self.scheduler.points.uses.is_some() {
+                self.tell_use(symbol, value, true);
+            }
         }
         self.heap.symbol_set_value(symbol, value);
         Ok(())
+    }
+
+    /// Notes for the report of a schedule that the running task uses a special variable.
+    #[cold]
+    pub(crate) fn tell_use(&mut self, symbol: Value, value: Value, is_set: bool) {
+        let task = self.scheduler.running.as_ref().map_or(TaskNumber::NONE, |task| task.number);
+        let value = if value == Value::UNBOUND { "unbound".into() } else { describe(&self.heap, value) };
+        if let Some(uses) = &mut self.scheduler.points.uses {
+            uses.push(VariableUse { task, symbol, value, is_set });
+        }
     }
 
     /// Binds a special variable in the running task.

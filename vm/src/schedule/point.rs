@@ -6,22 +6,55 @@
 
 use super::{Scheduler, TurnEnd};
 use crate::raise::Exit;
-use crate::task::{TaskEnd, UnwindTarget, Unwinding};
+use crate::task::{TaskEnd, TaskNumber, UnwindTarget, Unwinding};
 use crate::value::Value;
 
 /// Kinds of operations before which a task stands at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Grain {
     /// Builtins that change what others can see, or begin to wait.
-    #[default]
     Changes,
     /// Also those that look at what others have changed.
     Reads,
     /// Also ticks after something that other tasks can see, among which are reading and setting a special
     /// variable of the program.
+    #[default]
     Variables,
     /// Also all ticks, which is wherever the machine can preempt a task.
     Ticks,
+}
+
+impl Grain {
+    /// All grains, the coarsest first.
+    pub const ALL: [Grain; 4] = [Grain::Changes, Grain::Reads, Grain::Variables, Grain::Ticks];
+
+    /// Returns the name, as commands, tests and schedules write it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Grain::Changes => "changes",
+            Grain::Reads => "reads",
+            Grain::Variables => "variables",
+            Grain::Ticks => "ticks",
+        }
+    }
+
+    /// Returns the grain of this name.
+    pub fn from_name(name: &str) -> Option<Grain> {
+        Grain::ALL.into_iter().find(|grain| grain.name() == name)
+    }
+}
+
+/// A use of a special variable by a task that has not bound it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct VariableUse {
+    /// The task.
+    pub(crate) task: TaskNumber,
+    /// The variable, a symbol.
+    pub(crate) symbol: Value,
+    /// The value that was read or set, as a short text.
+    pub(crate) value: String,
+    /// Whether the variable was set.
+    pub(crate) is_set: bool,
 }
 
 /// Where tasks stop while schedules are explored.
@@ -38,6 +71,8 @@ pub(crate) struct Points {
     pub(crate) asked: Option<usize>,
     /// The way that was chosen for it.
     pub(crate) chosen: Option<usize>,
+    /// The uses of special variables, oldest first; `None` unless a schedule is told.
+    pub(crate) uses: Option<Vec<VariableUse>>,
 }
 
 impl Points {
