@@ -291,7 +291,7 @@ fn files_are_read_and_written_in_parts() {
 
 #[test]
 fn a_limit_that_ends_reading_leaves_what_has_come_to_the_next_call() {
-    // READ-SEQUENCE has put into the sequence what had come; READ and READ-LINE have taken nothing.
+    // READ-SEQUENCE has put into the sequence what had come; READ-LINE has taken nothing.
     let text = "(defmacro limited (form)
   `(print (handler-case (with-timeout 0.3 ,form) (failure (failure) (failure-cause failure)))))
 (with-open-file (s \"in\")
@@ -300,30 +300,39 @@ fn a_limit_that_ends_reading_leaves_what_has_come_to_the_next_call() {
     (print buffer)
     (mark \"sequence\")
     (print (read-line s)))
-  (limited (read s))
-  (mark \"datum\")
-  (print (read s))
   (limited (read-line s))
   (mark \"line\")
   (print (read-line s)))";
     let mut running = Running::start("limited-reader", &format!("{MARK}{text}"));
     let mut fifo = std::fs::File::options().write(true).open(running.path("in")).expect("it is there");
-    for (part, mark) in [("abc", "sequence"), ("def\n(1 2 ", "datum"), ("3) half", "line")] {
+    for (part, mark) in [("abc", "sequence"), ("def\nhalf", "line")] {
         fifo.write_all(part.as_bytes()).expect("it is read");
         running.await_file(mark);
     }
     fifo.write_all(b" a line\n").expect("it is read");
     drop(fifo);
-    let output = running.output();
-    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    let expected = [
-        ":TIMEOUT",
-        "#(#\\a #\\b #\\c - - -)",
-        "\"def\"",
-        ":TIMEOUT",
-        "(1 2 3)",
-        ":TIMEOUT",
-        "\" half a line\"",
-    ];
-    assert_eq!(lines, expected);
+    let expected = [":TIMEOUT", "#(#\\a #\\b #\\c - - -)", "\"def\"", ":TIMEOUT", "\"half a line\""];
+    assert_eq!(lines_of(&running.output()), expected);
+}
+
+#[test]
+fn a_limit_that_ends_reading_a_datum_of_standard_input_leaves_it_there() {
+    let text = "(print (handler-case (with-timeout 0.3 (read)) (failure (failure) (failure-cause failure))))
+(mark \"datum\")
+(print (list (read) (read-line)))";
+    let folder = Folder::with("limited-input", &[("main.esl", &format!("{MARK}{text}"))]);
+    let mut command = eslvm(&["run", "main.esl"]);
+    command.current_dir(folder.path()).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut running = Running { child: command.spawn().expect("the command is there"), folder };
+    let mut input = running.child.stdin.take().expect("it is piped");
+    input.write_all(b"(1 2 ").expect("it is read");
+    running.await_file("datum");
+    input.write_all(b"3) rest\n").expect("it is read");
+    drop(input);
+    assert_eq!(lines_of(&running.output()), [":TIMEOUT", "((1 2 3) \"rest\")"]);
+}
+
+/// Returns the lines of an output that are not empty, without blanks around them.
+fn lines_of(output: &str) -> Vec<&str> {
+    output.lines().map(str::trim).filter(|line| !line.is_empty()).collect()
 }
