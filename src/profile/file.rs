@@ -48,6 +48,9 @@ impl Profile {
 
     fn flame_graph(&self, unit: ProfileUnit) -> io::Result<Vec<u8>> {
         let mut options = flamegraph::Options::default();
+        // The beginning of a name tells more than its end.
+        options.text_truncate_direction = flamegraph::TextTruncateDirection::Right;
+        options.image_width = Some(1380);
         (options.title, options.count_name) = match unit {
             ProfileUnit::Ticks => ("Ticks of the run".into(), "ticks".into()),
             ProfileUnit::Time => ("Time of the run".into(), "ns".into()),

@@ -10,6 +10,8 @@ use std::fmt::Write as _;
 use esl_vm::observe::{Observer, Seen};
 use esl_vm::task::TaskNumber;
 
+use super::covered::Covered;
+
 /// Most bars, arrows, signs and bands in a drawing.
 const ITEMS: usize = 20_000;
 /// Most rows in a drawing.
@@ -17,7 +19,8 @@ const ROWS: usize = 100;
 
 // Lengths in pixels.
 const WIDTH: f64 = 1200.0;
-const LEFT: f64 = 150.0;
+/// Width of the names of tasks, at least and at most.
+const NAMES: (f64, f64) = (90.0, 360.0);
 const RIGHT: f64 = 30.0;
 const TOP: f64 = 64.0;
 const ROW: f64 = 36.0;
@@ -26,6 +29,10 @@ const BAR: f64 = 14.0;
 const BAR_HEIGHT: f64 = 16.0;
 /// Width of a character of the texts in bars and above them.
 const CHARACTER: f64 = 5.6;
+/// Width of a character of a name.
+const NAME_CHARACTER: f64 = 7.0;
+/// Half of the width of a sign.
+const SIGN: f64 = 6.0;
 
 /// Activity of a task, drawn as a bar.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -176,12 +183,14 @@ impl Observer for Drawing {
 struct Scale {
     begin: u64,
     length: f64,
+    /// Where the bars begin, to the right of the names.
+    left: f64,
 }
 
 impl Scale {
     fn x(&self, time: u64) -> f64 {
         let part = time.saturating_sub(self.begin) as f64 / self.length;
-        LEFT + (WIDTH - LEFT - RIGHT) * part
+        self.left + (WIDTH - self.left - RIGHT) * part
     }
 
     /// Returns the distance of the lines of the axis in nanoseconds: 1, 2 or 5 times a power of ten.
@@ -208,16 +217,19 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// Returns as much of a text as fits into `width`; nothing if that is less than five characters.
-fn fit(text: &str, width: f64) -> String {
-    let room = ((width - 6.0) / CHARACTER).max(0.0) as usize;
-    if text.chars().count() <= room {
-        text.into()
-    } else if room < 5 {
-        String::new()
+/// Returns as much of a name as fits into `width`.
+fn fit(name: &str, width: f64) -> String {
+    let room = (width / NAME_CHARACTER).max(1.0) as usize;
+    if name.chars().count() <= room {
+        name.into()
     } else {
-        text.chars().take(room - 1).chain(['…']).collect()
+        name.chars().take(room - 1).chain(['…']).collect()
     }
+}
+
+/// Returns the name of a task as it stands before its row.
+fn name_of_row(row: &TaskRow) -> &str {
+    row.name.strip_prefix("task ").unwrap_or(&row.name)
 }
 
 const STYLE: &str = "text{font:11px sans-serif;fill:#333}.s{font-size:10px;fill:#555}.n{text-anchor:end;font-weight:bold}\
@@ -237,7 +249,10 @@ impl Drawing {
         self.collections.extend(self.collects_since.take().map(|begin| (begin, end)));
         let begin =
             self.rows.iter().filter_map(|row| row.bars.first()).map(|bar| bar.begin).min().unwrap_or(0);
-        let scale = Scale { begin, length: (end.saturating_sub(begin)).max(1) as f64 };
+        let longest = self.rows.iter().map(|row| name_of_row(row).chars().count()).max().unwrap_or(0);
+        let left = (longest as f64 * NAME_CHARACTER + 18.0).clamp(NAMES.0, NAMES.1);
+        let scale = Scale { begin, length: (end.saturating_sub(begin)).max(1) as f64, left };
+        let covered = self.covered(&scale);
         let bottom = TOP + ROW * self.rows.len().max(1) as f64 + 6.0;
         let notes = self.notes();
         let height = bottom + 24.0 + 16.0 * notes.len() as f64;
@@ -256,20 +271,49 @@ impl Drawing {
         }
         axis(&mut svg, &scale, end, bottom);
         for (index, row) in self.rows.iter().enumerate() {
-            draw_bars(&mut svg, &scale, index, row);
+            draw_bars(&mut svg, &scale, index, row, &covered[index]);
         }
         for (time, from, to, event) in &self.arrows {
             draw_arrow(&mut svg, scale.x(*time), *from, *to, event);
         }
         for (index, row) in self.rows.iter().enumerate() {
-            draw_marks(&mut svg, &scale, index, row);
+            draw_marks(&mut svg, &scale, index, row, &covered[index]);
         }
         for (index, note) in notes.iter().enumerate() {
             let y = bottom + 18.0 + 16.0 * index as f64;
-            _ = writeln!(svg, "<text x=\"{LEFT}\" y=\"{y}\" class=\"s\">{}</text>", escape(note));
+            _ = writeln!(svg, "<text x=\"{left}\" y=\"{y}\" class=\"s\">{}</text>", escape(note));
         }
         svg.push_str("</svg>\n");
         svg
+    }
+
+    /// Returns what covers texts in each row.
+    fn covered(&self, scale: &Scale) -> Vec<Covered> {
+        let mut covered = vec![Covered::default(); self.rows.len()];
+        for (row, covered) in self.rows.iter().zip(&mut covered) {
+            for (time, sign, _) in &row.marks {
+                let x = scale.x(*time) + aside(*sign);
+                if *sign != Sign::Signals {
+                    covered.bars.push((x - SIGN, x + SIGN));
+                }
+            }
+            let runs = row.bars.iter().filter(|bar| bar.state == Activity::Runs);
+            covered.bars.extend(runs.map(|bar| {
+                let x = scale.x(bar.begin);
+                (x, scale.x(bar.end).max(x + 2.0))
+            }));
+        }
+        for &(time, from, to, _) in &self.arrows {
+            let x = scale.x(time);
+            let (upper, lower) = (from.min(to), from.max(to));
+            for row in upper + 1..=lower {
+                covered[row].above.push(x);
+                if row < lower {
+                    covered[row].bars.push((x - 1.0, x + 1.0));
+                }
+            }
+        }
+        covered
     }
 
     fn notes(&self) -> Vec<String> {
@@ -291,7 +335,7 @@ impl Drawing {
 }
 
 fn legend(svg: &mut String) {
-    let mut x = LEFT;
+    let mut x = NAMES.0;
     let bars = [("r", "runs"), ("y", "is ready"), ("w", "waits"), ("u", "is suspended"), ("c", "collection")];
     for (class, text) in bars {
         _ = write!(svg, "<rect class=\"{class}\" x=\"{x}\" y=\"14\" width=\"14\" height=\"12\"/>");
@@ -333,10 +377,11 @@ fn top_of_bars(row: usize) -> f64 {
     TOP + ROW * row as f64 + BAR
 }
 
-fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow) {
+fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow, covered: &Covered) {
     let y = top_of_bars(index);
-    let name = fit(&row.name, LEFT - 10.0);
-    _ = writeln!(svg, "<text class=\"n\" x=\"{}\" y=\"{}\">{}</text>", LEFT - 8.0, y + 12.0, escape(&name));
+    let (x, text_y) = (scale.left - 8.0, y + 12.0);
+    let (name, title) = (escape(&fit(name_of_row(row), scale.left - 12.0)), escape(&row.name));
+    _ = writeln!(svg, "<text class=\"n\" x=\"{x}\" y=\"{text_y}\">{name}<title>{title}</title></text>");
     // Bars of running are widened so as to be seen, and are drawn over the others.
     for runs in [false, true] {
         let mut last = f64::NEG_INFINITY;
@@ -359,16 +404,12 @@ fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow) {
                 "<rect class=\"{class}\" x=\"{x:.1}\" y=\"{y}\" width=\"{width:.1}\" height=\"{BAR_HEIGHT}\"><title>{}, {begin:.3} to {end:.3} ms</title></rect>",
                 escape(&title)
             );
+            // A text that does not fit, or that something would cover, is left out: the bar has it as its title.
             if let Activity::Waits(reason) | Activity::IsSuspended(reason) = &bar.state {
-                let text = fit(reason, width);
-                if !text.is_empty() {
-                    _ = writeln!(
-                        svg,
-                        "<text class=\"s\" x=\"{:.1}\" y=\"{}\">{}</text>",
-                        x + 4.0,
-                        y + 12.0,
-                        escape(&text)
-                    );
+                let text_width = CHARACTER * reason.chars().count() as f64;
+                if let Some(x) = covered.place_in_bar(x + 4.0, right - 2.0, text_width) {
+                    let text = escape(reason);
+                    _ = writeln!(svg, "<text class=\"s\" x=\"{x:.1}\" y=\"{text_y}\">{text}</text>");
                 }
             }
         }
@@ -387,6 +428,11 @@ fn draw_arrow(svg: &mut String, x: f64, from: usize, to: usize, event: &str) {
          <path class=\"h\" d=\"M{x:.1} {end}l-3.5 {back}h7z\"/></g>",
         escape(event)
     );
+}
+
+/// Returns how far to the right of its time a sign stands: a recovery stands beside its failure.
+fn aside(sign: Sign) -> f64 {
+    if sign == Sign::Recovers { 10.0 } else { 0.0 }
 }
 
 /// Draws a sign on the bar whose upper edge is at `y`.
@@ -418,7 +464,7 @@ fn draw_sign(svg: &mut String, sign: Sign, x: f64, y: f64) {
     };
 }
 
-fn draw_marks(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow) {
+fn draw_marks(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow, covered: &Covered) {
     let y = top_of_bars(index);
     // Texts stand above the bars, where the text before leaves room.
     let mut free = 0.0;
@@ -429,9 +475,7 @@ fn draw_marks(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow) {
             continue;
         }
         last = Some((*sign, x));
-        // A recovery stands beside its failure.
-        let aside = if *sign == Sign::Recovers { 10.0 } else { 0.0 };
-        draw_sign(svg, *sign, x + aside, y);
+        draw_sign(svg, *sign, x + aside(*sign), y);
         let width = CHARACTER * text.chars().count() as f64;
         // Other signs explain themselves, and arrows show what a net and the end of a task signal.
         let has_text = match sign {
@@ -439,8 +483,9 @@ fn draw_marks(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow) {
             Sign::Signals => text != "signals an event" && !text.ends_with(&row.name),
             Sign::IsToEnd | Sign::Ends(_) => false,
         };
-        let text_x = x.min(WIDTH - width - 4.0);
-        if has_text && text_x >= free {
+        // Beside the arrow of its own signal.
+        let text_x = (x + 3.0).min(WIDTH - width - 4.0);
+        if has_text && text_x >= free && covered.is_free_above(text_x, width) {
             let class = if *sign == Sign::Fails { "s t" } else { "s" };
             _ = writeln!(
                 svg,
