@@ -1,13 +1,15 @@
 //! The REPL of a run that is under way elsewhere: lines are typed here, and evaluated there.
 
-use std::fmt;
 use std::io::{self, IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use esl_vm::host::{Inbox, Incoming, Rights};
 
-use super::lines::Line;
+use super::commands::{LineMeaning, SessionCommand, completions_of, help, meaning_of};
+use super::lines::{CompletionRequest, Line, WordCompletion};
+use super::refusal::{AttachError, RequestRefusal};
 use super::screen::PromptScreen;
 use super::typing::Typing;
 use super::wire::{AttachSecurity, Wire};
@@ -16,97 +18,32 @@ use crate::command::{FAILED, NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, complain, 
 use crate::operate::attach::{self, WireForm};
 
 /// Environment variable with the secret, unless a file is named.
-const SECRET: &str = "ESL_SECRET";
+pub(super) const SECRET: &str = "ESL_SECRET";
 /// Name of the role that may evaluate.
 const PATCH: &str = "patch";
 
-const HELP: &str = "\
-:tasks              the tasks of the run, as a tree, with their numbers
-:bt [N]             the backtrace of the last failure here, or what task N does and where
-:failures           the latest failures of the run, if the run notes them
-:facts [NAME [N]]   facts of the database, 500 at a time, after the first N
-:data               relations, locks of properties, and inputs
-:watch FORM         writes the value of a form, and again after each change of what it reads
-:abort N            aborts task N
-:suspend N          suspends task N and the tasks that it has made
-:resume N           resumes task N and the tasks that it has made
-:pause, :continue   stops all tasks, and lets them go on
-:signal NAME DATA…  signals an input, or the event that a variable holds
-:patch FILE         makes the definitions of a file in one step, or none of them
-:undo-patch         undoes the newest patch
-:quit               ends this session; the run goes on
-";
+/// The commands.
+const COMMANDS: &[SessionCommand] = &[
+    row(&[":tasks"], "", "the tasks of the run, as a tree, with their numbers"),
+    row(&[":bt"], "[N]", "the backtrace of the newest failure, or what task N does and where"),
+    row(&[":failures"], "", "the latest failures of the run"),
+    row(&[":facts"], "[NAME [N]]", "facts of the database, 500 at a time, after the first N"),
+    row(&[":data"], "", "relations, locks of properties, and inputs"),
+    row(&[":watch"], "FORM", "writes the value of a form, and again after each change of what it reads"),
+    row(&[":abort"], "N", "aborts task N"),
+    row(&[":suspend"], "N", "suspends task N and the tasks that it has made"),
+    row(&[":resume"], "N", "resumes task N and the tasks that it has made"),
+    row(&[":pause"], "", "stops all tasks"),
+    row(&[":continue"], "", "lets all tasks go on"),
+    row(&[":signal"], "NAME DATA…", "signals an input, or the event that a variable holds"),
+    row(&[":patch"], "FILE", "makes the definitions of a file in one step, or none of them"),
+    row(&[":undo-patch"], "", "undoes the newest patch"),
+    row(&[":help"], "", "this list; (help 'name) says what a name means"),
+    row(&[":quit", ":exit"], "", "ends this session, as Ctrl-D does; the run goes on"),
+];
 
-/// Returns whether a line is a command, not a keyword to be evaluated.
-fn is_command(line: &str) -> bool {
-    let word = line.split_whitespace().next().unwrap_or("");
-    let is_listed = |entry: &str| entry.split([' ', ',']).any(|listed| listed == word);
-    word.starts_with(':')
-        && (matches!(word, ":help" | ":exit")
-            || HELP.lines().any(|line| is_listed(&line[..20.min(line.len())])))
-}
-
-/// Reason why a session could not be begun.
-#[derive(Debug)]
-enum AttachError {
-    /// No run can be reached at this address.
-    Unreachable(String, io::Error),
-    /// Nobody has said the secret.
-    NoSecret,
-    /// The file with the secret cannot be read.
-    SecretFile(PathBuf, io::Error),
-    /// No thread can be made to read standard input.
-    NoReader(io::Error),
-    /// No thread can be made to hear the run.
-    NoHearer(io::Error),
-    /// The connection cannot be shared, or no thread can be made to interrupt the run.
-    Connection(io::Error),
-}
-
-impl fmt::Display for AttachError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            AttachError::Unreachable(address, error) => {
-                write!(f, "no run can be reached at {address}: {error}")
-            }
-            AttachError::NoSecret => {
-                write!(f, "a port asks for a secret: use --secret-file, or the environment variable {SECRET}")
-            }
-            AttachError::SecretFile(file, error) => write!(f, "{}: {error}", file.display()),
-            AttachError::NoReader(error) => {
-                write!(f, "no thread can be made to read standard input: {error}")
-            }
-            AttachError::NoHearer(error) => write!(f, "no thread can be made to hear the run: {error}"),
-            AttachError::Connection(error) => error.fmt(f),
-        }
-    }
-}
-
-/// Reason why a request came to nothing.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum RequestRefusal {
-    /// The run says so, in these words.
-    ByRun(String),
-    /// The run has answered something that is no answer.
-    NotAnAnswer,
-    /// The command needs something.
-    Needs(String, &'static str),
-    /// The file cannot be read, for the reason that the system gives.
-    Unreadable(String, String),
-    /// There is no patch to be undone.
-    NoPatch,
-}
-
-impl fmt::Display for RequestRefusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            RequestRefusal::ByRun(text) => f.write_str(text),
-            RequestRefusal::NotAnAnswer => f.write_str("it is no answer"),
-            RequestRefusal::Needs(command, needed) => write!(f, "`{command}` needs {needed}"),
-            RequestRefusal::Unreadable(file, reason) => write!(f, "{file} cannot be read: {reason}"),
-            RequestRefusal::NoPatch => f.write_str("there is no patch to be undone"),
-        }
-    }
+const fn row(names: &'static [&'static str], arguments: &'static str, does: &'static str) -> SessionCommand {
+    SessionCommand { names, arguments, does }
 }
 
 /// What a request comes to.
@@ -176,14 +113,16 @@ pub fn attach(
     let (answer, answers) = channel();
     let from = wire.try_clone().map_err(|error| usage(AttachError::Connection(error)))?;
     let hears = printer.clone();
+    let end = EndOfSession::default();
+    let told = end.clone();
     let heard = std::thread::Builder::new().name("run".into()).spawn(move || {
-        hear(from, &hears, &answer);
+        hear(from, &hears, &answer, &told);
         drop(answer);
         drop(lines.send(Line::End));
     });
     heard.map_err(|error| usage(AttachError::NoHearer(error)))?;
     interrupt_run(&wire, &typing, inbox).map_err(|error| usage(AttachError::Connection(error)))?;
-    let mut attached = Attached { wire, answers, typing, printer, asked: 0, failure: None };
+    let mut attached = Attached { wire, answers, typing, printer, asked: 0, failure: None, end };
     let status = attached.begin(address, rights).and_then(|()| attached.talk());
     attached.wire.close();
     status
@@ -215,12 +154,28 @@ fn interrupt_run(wire: &Wire, typing: &Typing, inbox: Inbox) -> io::Result<()> {
     started.map(drop)
 }
 
+/// Why the connection ends, as the run says it.
+#[derive(Clone, Default)]
+struct EndOfSession(Arc<Mutex<Option<String>>>);
+
+impl EndOfSession {
+    fn note(&self, reason: &str) {
+        // The text is whole at every moment.
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(reason.into());
+    }
+
+    fn reason(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
 /// Prints what the run writes, and passes answers on, until the connection ends.
-fn hear(mut from: Wire, printer: &SessionPrinter, answers: &Sender<(i64, RunAnswer)>) {
+fn hear(mut from: Wire, printer: &SessionPrinter, answers: &Sender<(i64, RunAnswer)>, end: &EndOfSession) {
     while let Ok(form) = attach::read(&mut from) {
         let items = form.items().unwrap_or_default();
         match (items.first().and_then(WireForm::name).as_deref(), items) {
             (Some(":write-string"), [_, WireForm::Text(text), ..]) => printer.print(text),
+            (Some(":refused" | ":run-ended"), [_, WireForm::Text(reason)]) => end.note(reason),
             (Some(":return"), [_, result, WireForm::Integer(number)]) => {
                 let result = match result.items() {
                     Some([kind, value]) if kind.name().as_deref() == Some(":ok") => Ok(value.clone()),
@@ -246,6 +201,8 @@ struct Attached {
     asked: i64,
     /// Report of the last failure.
     failure: Option<String>,
+    /// Why the connection ends.
+    end: EndOfSession,
 }
 
 /// What ended a session.
@@ -283,10 +240,17 @@ impl Attached {
 
     /// Greets the run, and tells it the rights of what is evaluated here, if anything may be.
     fn begin(&mut self, address: &str, rights: &Rights) -> Result<(), u8> {
-        let role = match self.ask("swank:connection-info", &[]) {
+        let role = match self.ask("swank:connection-info", &[WireForm::text(attach::CLIENT)]) {
             Ok(Ok(info)) => info.items().and_then(|items| items.last()?.as_text().map(str::to_string)),
             Ok(Err(reason)) => {
                 complain(reason);
+                return Err(USAGE);
+            }
+            Err(Disconnected) if self.end.reason().is_some() => {
+                complain(format_args!(
+                    "the run at {address} refuses: {}",
+                    self.end.reason().unwrap_or_default()
+                ));
                 return Err(USAGE);
             }
             Err(Disconnected) => {
@@ -323,20 +287,37 @@ impl Attached {
         let mut text = String::new();
         loop {
             self.typing.ask(if text.is_empty() { PROMPT } else { CONTINUATION });
-            let done = match self.typing.wait() {
-                Line::Text(line) if text.is_empty() && is_command(&line) => {
-                    let line = line.trim();
-                    if matches!(line, ":quit" | ":exit") {
-                        return Ok(SUCCESS);
+            let line = loop {
+                match self.typing.wait() {
+                    Line::Completing(request) if self.complete(&request).is_ok() => {}
+                    // The reader says that the connection has ended, too.
+                    Line::Completing(_) => {}
+                    line => break line,
+                }
+            };
+            let done = match line {
+                Line::Text(line) if text.is_empty() && meaning_of(&line, COMMANDS) != LineMeaning::Form => {
+                    self.typing.remember(line.trim());
+                    match meaning_of(&line, COMMANDS) {
+                        LineMeaning::Command(":quit", _) => return Ok(SUCCESS),
+                        LineMeaning::Command(command, rest) => self.command(command, rest),
+                        LineMeaning::NoCommand(reason) => {
+                            self.show(Err(RequestRefusal::NoCommand(reason)));
+                            Ok(())
+                        }
+                        LineMeaning::Form => Ok(()),
                     }
-                    self.typing.remember(line);
-                    self.command(line)
                 }
                 Line::Text(line) => {
                     text.push_str(&line);
                     text.push('\n');
-                    self.evaluate(&mut text)
+                    match self.evaluate(&mut text) {
+                        Ok(true) => return Ok(SUCCESS),
+                        Ok(false) => Ok(()),
+                        Err(Disconnected) => Err(Disconnected),
+                    }
                 }
+                Line::Completing(_) => Ok(()),
                 Line::Dropped => {
                     text.clear();
                     Ok(())
@@ -356,9 +337,7 @@ impl Attached {
                 }
             };
             if let Err(Disconnected) = done {
-                self.typing.leave();
-                complain("the run has ended");
-                return Ok(FAILED);
+                return Ok(self.ended());
             }
         }
     }
@@ -367,27 +346,56 @@ impl Attached {
     fn end(&mut self) -> u8 {
         match self.send("swank:connection-info", &[]) {
             Ok(_) => SUCCESS,
-            Err(Disconnected) => {
-                self.typing.leave();
-                complain("the run has ended");
-                FAILED
-            }
+            Err(Disconnected) => self.ended(),
         }
     }
 
-    /// Evaluates the forms of a text, unless they are incomplete.
-    fn evaluate(&mut self, text: &mut String) -> Result<(), Disconnected> {
+    /// Says that the run has ended, and returns the exit status.
+    fn ended(&self) -> u8 {
+        self.typing.leave();
+        complain(self.end.reason().unwrap_or_else(|| "the run has ended".into()));
+        FAILED
+    }
+
+    /// Evaluates the forms of a text, unless they are incomplete. Returns whether they ask for the end of the
+    /// session.
+    fn evaluate(&mut self, text: &mut String) -> Result<bool, Disconnected> {
         if text.trim().is_empty() {
             text.clear();
-            return Ok(());
+            return Ok(false);
         }
         let answer = self.ask("esl:evaluate", &[WireForm::text(text.as_str())])?;
-        if matches!(&answer, Ok(value) if value.name().as_deref() == Some(":more")) {
-            return Ok(());
+        let word = answer.as_ref().ok().and_then(WireForm::name);
+        if word.as_deref() == Some(":more") {
+            return Ok(false);
         }
         self.typing.remember(text.trim_end());
         text.clear();
-        self.show(answer);
+        match word.as_deref() {
+            Some(":quit") => return Ok(true),
+            Some(":help") => self.printer.print(&help(COMMANDS)),
+            _ => self.show(answer),
+        }
+        Ok(false)
+    }
+
+    /// Says how a word can be completed.
+    fn complete(&mut self, request: &CompletionRequest) -> Result<(), Disconnected> {
+        let found = if request.is_command {
+            completions_of(&request.word, COMMANDS)
+        } else {
+            let answer = self.ask("esl:complete", &[WireForm::text(request.word.as_str())])?;
+            let rows = answer.as_ref().ok().and_then(WireForm::items).unwrap_or_default();
+            let completion = |row: &WireForm| match row.items()? {
+                [WireForm::Text(text), WireForm::Text(about)] => {
+                    Some(WordCompletion { text: text.clone(), about: about.clone() })
+                }
+                _ => None,
+            };
+            rows.iter().filter_map(completion).collect()
+        };
+        // The person may have gone on.
+        _ = request.reply.send(found);
         Ok(())
     }
 
@@ -409,9 +417,7 @@ impl Attached {
     }
 
     /// Obeys a command.
-    fn command(&mut self, line: &str) -> Result<(), Disconnected> {
-        let (command, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
-        let rest = rest.trim();
+    fn command(&mut self, command: &str, rest: &str) -> Result<(), Disconnected> {
         let number = rest.parse().map(WireForm::Integer).unwrap_or(WireForm::nil());
         let needed = match command {
             ":abort" | ":suspend" | ":resume" => Some("the number of a task, which `:tasks` shows"),
@@ -427,7 +433,9 @@ impl Attached {
             ":tasks" => self.ask("esl:tasks", &[])?,
             ":bt" if rest.is_empty() => {
                 let report = self.failure.clone();
-                Ok(WireForm::Text(report.unwrap_or_else(|| "Nothing has failed here.\n".into())))
+                Ok(WireForm::Text(report.unwrap_or_else(|| {
+                    "Nothing has failed here; `:failures` shows the failures of the run.\n".into()
+                })))
             }
             ":bt" => self.ask("esl:backtrace", &[number])?,
             ":failures" => self.ask("esl:failures", &[])?,
@@ -472,7 +480,7 @@ impl Attached {
             ":watch" => needs("a form"),
             ":signal" => needs("the name of an input, or of a variable with an event"),
             ":patch" => needs("the path of a file"),
-            _ => Ok(WireForm::text(HELP)),
+            _ => Ok(WireForm::text(help(COMMANDS))),
         };
         self.show(answer);
         Ok(())

@@ -1,72 +1,86 @@
-//! Lines from a terminal: editing, history across sessions, completion of names.
+//! Lines from a terminal: editing, history across sessions, completion.
 
 use std::path::PathBuf;
 
+use rustyline::completion::Pair;
+use rustyline::config::CompletionType;
 use rustyline::error::ReadlineError;
 use rustyline::history::DefaultHistory;
 use rustyline::{Completer, Helper, Highlighter, Hinter, Validator};
 
-use super::lines::{Line, Lines};
+use super::lines::{Line, Lines, WordCompletion};
 use super::screen::PromptScreen;
 
+/// Width of the list of completions.
+const WIDTH: usize = 78;
+/// Least width of the names in it, if there is something to say about any.
+const NAMES: usize = 20;
+/// Completions that are listed without asking.
+const LISTED: usize = 60;
+
+/// Function that completes the words of a line: it is given all before a word, and the beginning of the word.
+pub(crate) type CompleteWord = Box<dyn Fn(&str, &str) -> Vec<WordCompletion>>;
+
 /// The helper of the line editor.
-#[derive(Default, Helper, Hinter, Highlighter, Validator, Completer)]
+#[derive(Helper, Hinter, Highlighter, Validator, Completer)]
 struct EditorHelper {
     #[rustyline(Completer)]
-    completer: NameCompleter,
+    completer: WordCompleter,
 }
 
-/// Completes the names of the language, and those that the person has used. They are sorted.
-#[derive(Default)]
-struct NameCompleter {
-    names: Vec<String>,
-}
+/// Completes the word at the cursor.
+struct WordCompleter(CompleteWord);
 
-impl NameCompleter {
-    /// Returns the start of the name that ends at `position`, and all names that begin with that part of it.
-    fn candidates(&self, line: &str, position: usize) -> (usize, Vec<String>) {
-        let start = line[..position].rfind(|c: char| "()'`,\"# ".contains(c)).map_or(0, |index| index + 1);
-        let prefix = line[start..position].to_uppercase();
-        if prefix.is_empty() {
-            return (start, Vec::new());
-        }
-        let first = self.names.partition_point(|name| *name < prefix);
-        let names = self.names[first..].iter().take_while(|name| name.starts_with(&prefix));
-        (start, names.map(|name| name.to_lowercase()).collect())
-    }
-}
-
-impl rustyline::completion::Completer for NameCompleter {
-    type Candidate = String;
+impl rustyline::completion::Completer for WordCompleter {
+    type Candidate = Pair;
 
     fn complete(
         &self,
         line: &str,
         position: usize,
         _context: &rustyline::Context<'_>,
-    ) -> rustyline::Result<(usize, Vec<String>)> {
-        Ok(self.candidates(line, position))
+    ) -> rustyline::Result<(usize, Vec<Pair>)> {
+        let start = line[..position].rfind(|c: char| "()'`,\"# ".contains(c)).map_or(0, |index| index + 1);
+        let (before, word) = line[..position].split_at(start);
+        let found = if word.is_empty() { Vec::new() } else { (self.0)(before, word) };
+        Ok((start, listed(found)))
     }
 }
 
+/// Returns completions as they are listed: each with what there is to say about it.
+fn listed(found: Vec<WordCompletion>) -> Vec<Pair> {
+    let width = found.iter().map(|completion| completion.text.chars().count()).max().unwrap_or(0).max(NAMES);
+    let shown = |WordCompletion { text, about }: WordCompletion| {
+        let row = format!("{text:width$}  {about}");
+        let display = if about.is_empty() { text.clone() } else { row.chars().take(WIDTH).collect() };
+        Pair { display, replacement: text }
+    };
+    found.into_iter().map(shown).collect()
+}
+
 /// A terminal with line editing.
-pub(super) struct Editor {
+pub(crate) struct Editor {
     editor: Option<rustyline::Editor<EditorHelper, DefaultHistory>>,
     history: Option<PathBuf>,
 }
 
 impl Editor {
-    /// Creates an editor with the history of earlier sessions. From now on `screen` prints above the line
-    /// that is edited.
-    pub(super) fn new(screen: &PromptScreen) -> Editor {
-        let mut editor = rustyline::Editor::<EditorHelper, DefaultHistory>::new().ok();
+    /// Creates an editor that completes words by a function, with the history of earlier sessions in a file of
+    /// this name in the person's home. From now on `screen` prints above the line that is edited.
+    pub(crate) fn new(screen: &PromptScreen, history: &str, complete: CompleteWord) -> Editor {
+        let config = rustyline::Config::builder()
+            .completion_type(CompletionType::List)
+            .completion_show_all_if_ambiguous(true)
+            .completion_prompt_limit(LISTED)
+            .build();
+        let mut editor = rustyline::Editor::<EditorHelper, DefaultHistory>::with_config(config).ok();
         let external = editor.as_mut().and_then(|editor| editor.create_external_printer().ok());
         if let Some(external) = external {
             screen.print_through(Box::new(external));
         }
-        let history = std::env::home_dir().map(|home| home.join(".esl-history"));
+        let history = std::env::home_dir().map(|home| home.join(history));
         if let (Some(editor), Some(history)) = (&mut editor, &history) {
-            editor.set_helper(Some(EditorHelper::default()));
+            editor.set_helper(Some(EditorHelper { completer: WordCompleter(complete) }));
             // The first session has none.
             _ = editor.load_history(history);
         }
@@ -87,12 +101,6 @@ impl Lines for Editor {
         }
     }
 
-    fn learn(&mut self, names: Vec<String>) {
-        if let Some(helper) = self.editor.as_mut().and_then(|editor| editor.helper_mut()) {
-            helper.completer.names = names;
-        }
-    }
-
     fn remember(&mut self, form: &str) {
         let Some(editor) = &mut self.editor else { return };
         // The session goes on without a history that cannot be kept.
@@ -105,15 +113,27 @@ impl Lines for Editor {
 
 #[cfg(test)]
 mod tests {
+    use rustyline::completion::Completer;
+
     use super::*;
 
     #[test]
-    fn names_are_completed_from_their_beginning() {
-        let names = ["FAIL", "FAILURE-CAUSE", "FALSE", "WIDGET-OK?"].map(String::from).to_vec();
-        let completer = NameCompleter { names };
-        assert_eq!(completer.candidates("(print (fai", 11), (8, vec!["fail".into(), "failure-cause".into()]));
-        assert_eq!(completer.candidates("(wid)", 4), (1, vec!["widget-ok?".into()]));
-        assert_eq!(completer.candidates("(", 1), (1, vec![]));
-        assert_eq!(completer.candidates("(x", 2), (1, vec![]));
+    fn the_word_at_the_cursor_is_completed() {
+        let complete = |before: &str, word: &str| {
+            let about = if before.is_empty() { String::new() } else { format!("After {before}") };
+            vec![WordCompletion { text: format!("{word}ure"), about }]
+        };
+        let completer = WordCompleter(Box::new(complete));
+        let history = DefaultHistory::new();
+        let context = rustyline::Context::new(&history);
+        let found = |line: &str, position: usize| {
+            let (start, found) = completer.complete(line, position, &context).expect("nothing can go wrong");
+            let rows = found.into_iter().map(|pair| (pair.replacement, pair.display));
+            (start, rows.collect::<Vec<_>>())
+        };
+        let about = "failure               After (print (".to_string();
+        assert_eq!(found("(print (fail x", 12), (8, vec![("failure".into(), about)]));
+        assert_eq!(found("fail", 4), (0, vec![("failure".into(), "failure".into())]));
+        assert_eq!(found("(", 1), (1, vec![]));
     }
 }

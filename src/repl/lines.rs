@@ -1,11 +1,12 @@
 //! Lines of input: what reading one gives, where they come from, and the lines of a pipe.
 
 use std::io::BufRead;
+use std::sync::mpsc::Sender;
 
 use esl_vm::host::ProcessSignal;
 
 /// Result of reading a line.
-pub(super) enum Line {
+pub(crate) enum Line {
     /// Text of a line, without its newline.
     Text(String),
     /// The person drops what was typed so far.
@@ -16,20 +17,39 @@ pub(super) enum Line {
     Signalled(ProcessSignal),
     /// Reading failed, for this reason.
     Failed(String),
+    /// The person wants to know how something can be completed. The line is still to come.
+    Completing(CompletionRequest),
+}
+
+/// A word that is to be completed.
+pub(crate) struct CompletionRequest {
+    /// The word.
+    pub(crate) word: String,
+    /// Whether it is a command, not a name.
+    pub(crate) is_command: bool,
+    /// Takes the completions.
+    pub(crate) reply: Sender<Vec<WordCompletion>>,
+}
+
+/// A text that completes what was typed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct WordCompletion {
+    /// The text.
+    pub(crate) text: String,
+    /// What there is to say about it, in a line.
+    pub(crate) about: String,
 }
 
 /// A place that lines come from.
-pub(super) trait Lines {
+pub(crate) trait Lines {
     /// Reads the next line.
     fn next(&mut self, prompt: &str) -> Line;
     /// Adds a whole form to the history.
     fn remember(&mut self, _form: &str) {}
-    /// Takes the names to complete from.
-    fn learn(&mut self, _names: Vec<String>) {}
 }
 
 /// Lines from a pipe or a file.
-pub(super) struct Pipe;
+pub(crate) struct Pipe;
 
 impl Lines for Pipe {
     fn next(&mut self, _prompt: &str) -> Line {

@@ -19,9 +19,11 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the REPL talks with people")]
 
 mod attached;
-mod editor;
-mod lines;
-mod screen;
+pub(crate) mod commands;
+pub(crate) mod editor;
+pub(crate) mod lines;
+mod refusal;
+pub(crate) mod screen;
 mod terminal;
 mod typing;
 mod wire;
@@ -30,7 +32,7 @@ use std::io::{IsTerminal, Write};
 use std::ops::ControlFlow::{self, Break, Continue};
 
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_vm::host::{Output, RealHost, Rights};
+use esl_vm::host::{Incoming, Output, RealHost, Rights, SurveyRequest};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::value::Value;
@@ -40,7 +42,8 @@ use crate::command::{Interrupts, NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, compla
 use crate::module_path::ModulePath;
 use crate::program;
 pub use attached::attach;
-use lines::Line;
+use commands::{LineMeaning, SessionCommand, completions_of, help, meaning_of};
+use lines::{CompletionRequest, Line, WordCompletion};
 use screen::PromptScreen;
 use typing::Typing;
 pub use wire::AttachSecurity;
@@ -49,6 +52,28 @@ pub use wire::AttachSecurity;
 const PROMPT: &str = "? ";
 /// Prompt for further lines of a form.
 const CONTINUATION: &str = "  ";
+
+/// The commands.
+const COMMANDS: &[SessionCommand] = &[
+    SessionCommand { names: &[":load"], arguments: "FILE", does: "evaluates the forms of a file" },
+    SessionCommand {
+        names: &[":bt"],
+        arguments: "",
+        does: "shows the newest failure: what it was, and the frames with their variables",
+    },
+    SessionCommand {
+        names: &[":tasks"],
+        arguments: "",
+        does: "shows the tasks, who made them, and what they wait for",
+    },
+    SessionCommand { names: &[":abort"], arguments: "N", does: "aborts the task with the number N" },
+    SessionCommand {
+        names: &[":help"],
+        arguments: "",
+        does: "shows this list; (help 'name) says what a name means",
+    },
+    SessionCommand { names: &[":quit", ":exit"], arguments: "", does: "ends the session, as Ctrl-D does" },
+];
 
 /// Runs the REPL until the end of the input or `:quit`, with these rights and the modules of `path`. Returns
 /// the exit status.
@@ -87,6 +112,10 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
     };
     let interrupts = interrupt_on_signal(machine.inbox(), end);
     machine.tell_variables();
+    machine.keep_journal();
+    if is_interactive {
+        println!("ESL {}; :help lists the commands, TAB completes, Ctrl-D ends", env!("CARGO_PKG_VERSION"));
+    }
     let mut repl = Repl { machine, typing, interrupts, virtual_time, failure: None };
     repl.call("%REPL-BEGIN", "");
     let status = repl.talk();
@@ -104,8 +133,20 @@ struct Repl {
     interrupts: Interrupts,
     /// Whether time passes only while a form is evaluated.
     virtual_time: bool,
-    /// Report of the last failure, for `:bt`.
-    failure: Option<String>,
+    /// Report of the last failure of a form, and the number that the journal had given by then.
+    failure: Option<(String, u64)>,
+}
+
+/// What the evaluation of a text came to.
+enum Evaluated {
+    /// The last form is incomplete, and nothing was evaluated.
+    More,
+    /// It is over.
+    Done,
+    /// The text asks for the end of the session.
+    Quit,
+    /// The text asks for the list of commands.
+    Help,
 }
 
 impl Repl {
@@ -113,8 +154,13 @@ impl Repl {
     fn next_line(&mut self, prompt: &'static str) -> Line {
         self.typing.ask(prompt);
         loop {
-            if let Some(line) = self.typing.take() {
-                return line;
+            match self.typing.take() {
+                Some(Line::Completing(request)) => {
+                    self.complete(&request);
+                    continue;
+                }
+                Some(line) => return line,
+                None => {}
             }
             let outcome = if self.virtual_time {
                 self.machine.run_ready(BACKGROUND_TICKS)
@@ -128,10 +174,28 @@ impl Repl {
             match outcome {
                 RunOutcome::TicksUsed | RunOutcome::Stopped => {}
                 RunOutcome::Done | RunOutcome::Waiting | RunOutcome::BudgetSpent => {
-                    return self.typing.wait();
+                    match self.typing.wait() {
+                        Line::Completing(request) => self.complete(&request),
+                        line => return line,
+                    }
                 }
             }
         }
+    }
+
+    /// Says how a word can be completed.
+    fn complete(&mut self, request: &CompletionRequest) {
+        let found = if request.is_command {
+            completions_of(&request.word, COMMANDS)
+        } else {
+            let found = self.call("%REPL-COMPLETE", &request.word);
+            let found = found.and_then(|value| self.machine.export(value).ok());
+            found.map_or(Vec::new(), |found| {
+                found.as_list().unwrap_or_default().into_iter().filter_map(completion_of).collect()
+            })
+        };
+        // The person may have gone on.
+        _ = request.reply.send(found);
     }
 
     /// Evaluates lines until the session ends. Returns the exit status.
@@ -139,17 +203,14 @@ impl Repl {
         let mut text = String::new();
         loop {
             let prompt = if text.is_empty() { PROMPT } else { CONTINUATION };
-            if text.is_empty() && self.typing.is_interactive {
-                self.typing.learn(self.machine.accessible_names());
-            }
             let line = self.next_line(prompt);
             if let Break(status) = self.unless_exited() {
                 // A background task has asked for the end.
                 return Ok(status);
             }
             match line {
-                Line::Text(line) if text.is_empty() && is_command(&line) => {
-                    if let Break(status) = self.command(line.trim()) {
+                Line::Text(line) if text.is_empty() && meaning_of(&line, COMMANDS) != LineMeaning::Form => {
+                    if let Break(status) = self.command(&line) {
                         return Ok(status);
                     }
                     self.typing.remember(&line);
@@ -157,14 +218,23 @@ impl Repl {
                 Line::Text(line) => {
                     text.push_str(&line);
                     text.push('\n');
-                    let is_whole = self.evaluate(&text);
+                    let evaluated = self.evaluate(&text);
                     if let Break(status) = self.unless_exited() {
                         return Ok(status);
                     }
-                    if is_whole {
-                        self.typing.remember(std::mem::take(&mut text).trim_end());
+                    match evaluated {
+                        Evaluated::More => continue,
+                        Evaluated::Done => {}
+                        Evaluated::Quit => {
+                            self.machine.flush();
+                            return Ok(SUCCESS);
+                        }
+                        Evaluated::Help => print!("{}", help(COMMANDS)),
                     }
+                    self.typing.remember(std::mem::take(&mut text).trim_end());
                 }
+                // They were seen to before.
+                Line::Completing(_) => {}
                 Line::Dropped => text.clear(),
                 Line::Signalled(signal) => {
                     self.typing.leave();
@@ -187,12 +257,16 @@ impl Repl {
         }
     }
 
-    /// Evaluates the forms of a text and prints their values. Returns whether the last form is complete; if
-    /// it is not, nothing has been evaluated.
-    fn evaluate(&mut self, text: &str) -> bool {
-        let Some(value) = self.call("%REPL-EVALUATE", text) else { return true };
+    /// Evaluates the forms of a text and prints their values.
+    fn evaluate(&mut self, text: &str) -> Evaluated {
+        let Some(value) = self.call("%REPL-EVALUATE", text) else { return Evaluated::Done };
         let datum = self.machine.export(value).ok();
-        !matches!(datum.as_ref().map(Datum::kind), Some(DatumKind::Symbol(symbol)) if symbol.name() == "MORE")
+        match datum.as_ref().and_then(Datum::as_symbol).map(|symbol| symbol.name()) {
+            Some("MORE") => Evaluated::More,
+            Some("QUIT") => Evaluated::Quit,
+            Some("HELP") => Evaluated::Help,
+            _ => Evaluated::Done,
+        }
     }
 
     /// Breaks with the exit status that the program has asked to end with.
@@ -202,25 +276,67 @@ impl Repl {
 
     /// Obeys a command of the REPL; breaks with the exit status at the end of the session.
     fn command(&mut self, line: &str) -> ControlFlow<u8> {
-        let (command, argument) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let (command, path) = match meaning_of(line, COMMANDS) {
+            LineMeaning::Command(command, argument) => (command, argument),
+            LineMeaning::NoCommand(reason) => {
+                println!("; {reason}");
+                return Continue(());
+            }
+            LineMeaning::Form => return Continue(()),
+        };
         match command {
-            ":quit" | ":exit" => {
+            ":quit" => {
                 self.machine.flush();
                 return Break(SUCCESS);
             }
+            ":load" if path.is_empty() => println!("; `:load` needs the path of a file"),
             ":load" => {
-                let path = argument.trim();
                 let bare = path.strip_prefix('"').and_then(|path| path.strip_suffix('"'));
                 self.call("%REPL-LOAD", bare.unwrap_or(path));
             }
-            ":bt" => match &self.failure {
+            ":bt" => match self.newest_failure() {
                 Some(report) => print!("{report}"),
                 None => println!("Nothing has failed."),
             },
             ":tasks" => print!("{}", self.machine.task_report()),
-            _ => print!("{HELP}"),
+            ":abort" => self.abort(path),
+            _ => print!("{}", help(COMMANDS)),
         }
         self.unless_exited()
+    }
+
+    /// Aborts a task in the background.
+    fn abort(&mut self, number: &str) {
+        let named = number.parse().unwrap_or(0);
+        let request = SurveyRequest { named: vec![named], ..SurveyRequest::default() };
+        match self.machine.survey(&request).tasks.first() {
+            Some(task) => {
+                println!("; {} is aborted", task.name);
+                self.machine.inbox().put(Incoming::Abort(named));
+            }
+            None if number.is_empty() => {
+                println!("; `:abort` needs the number of a task, which `:tasks` shows");
+            }
+            None => println!("; there is no task {number}; `:tasks` shows their numbers"),
+        }
+    }
+
+    /// Returns the report of the newest failure that was not recovered from: of a form, or of another task.
+    fn newest_failure(&self) -> Option<String> {
+        let request = SurveyRequest { failures_after: Some(0), ..SurveyRequest::default() };
+        let failures = self.machine.survey(&request).failures;
+        let newest = failures.into_iter().rev().find(|row| row.report.is_some());
+        match (&self.failure, newest) {
+            (Some((_, before)), Some(row)) if row.number > *before => row.report,
+            (Some((report, _)), _) => Some(report.clone()),
+            (None, row) => row?.report,
+        }
+    }
+
+    /// Returns the number of the newest failure that the journal has.
+    fn noted_failures(&self) -> u64 {
+        let request = SurveyRequest { failures_after: Some(0), ..SurveyRequest::default() };
+        self.machine.survey(&request).failures.last().map_or(0, |row| row.number)
     }
 
     /// Runs the machine until `task` has ended, or can never do so.
@@ -263,7 +379,7 @@ impl Repl {
             TaskResult::Failed(_) => match report {
                 Some(report) => {
                     print!("{}", in_short(&report));
-                    self.failure = Some(report);
+                    self.failure = Some((report, self.noted_failures()));
                 }
                 None => println!("Aborted"),
             },
@@ -289,16 +405,14 @@ fn in_short(report: &str) -> String {
     shown.flat_map(|line| [line, "\n"]).collect()
 }
 
-/// Returns whether a line is a command of the REPL, not a keyword to be evaluated.
-fn is_command(line: &str) -> bool {
-    let word = line.split_whitespace().next().unwrap_or("");
-    matches!(word, ":quit" | ":exit" | ":load" | ":bt" | ":tasks" | ":help")
+/// Returns the completion that a list of a name and a text stands for.
+fn completion_of(row: &Datum) -> Option<WordCompletion> {
+    let text = |datum: &Datum| match datum.kind() {
+        DatumKind::String(text) => Some(text.to_string()),
+        _ => None,
+    };
+    match row.as_list()?[..] {
+        [name, about] => Some(WordCompletion { text: text(name)?, about: text(about)? }),
+        _ => None,
+    }
 }
-
-const HELP: &str = "\
-:load FILE   evaluate the forms of a file
-:bt          show where the last failure came from
-:tasks       show the tasks, who made them, and what they wait for
-:help        this list; (help 'name) says what a function does
-:quit        end
-";

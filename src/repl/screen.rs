@@ -7,7 +7,7 @@ use rustyline::ExternalPrinter;
 
 /// Prints above the line that the person edits, or directly while there is no editor.
 #[derive(Clone, Default)]
-pub(super) struct PromptScreen(Arc<Mutex<Option<Box<dyn ExternalPrinter + Send>>>>);
+pub(crate) struct PromptScreen(Arc<Mutex<Option<Box<dyn ExternalPrinter + Send>>>>);
 
 impl PromptScreen {
     fn lock(&self) -> MutexGuard<'_, Option<Box<dyn ExternalPrinter + Send>>> {
@@ -16,12 +16,12 @@ impl PromptScreen {
     }
 
     /// Prints through an editor's printer from now on.
-    pub(super) fn print_through(&self, printer: Box<dyn ExternalPrinter + Send>) {
+    pub(crate) fn print_through(&self, printer: Box<dyn ExternalPrinter + Send>) {
         *self.lock() = Some(printer);
     }
 
     /// Prints directly from now on.
-    pub(super) fn leave_editor(&self) {
+    pub(crate) fn leave_editor(&self) {
         *self.lock() = None;
     }
 
@@ -29,7 +29,7 @@ impl PromptScreen {
     ///
     /// # Errors
     /// If standard output cannot be written.
-    pub(super) fn print(&self, bytes: &[u8]) -> std::io::Result<()> {
+    pub(crate) fn print(&self, bytes: &[u8]) -> std::io::Result<()> {
         if let Some(printer) = &mut *self.lock() {
             return printer.print(String::from_utf8_lossy(bytes).into_owned()).map_err(std::io::Error::other);
         }

@@ -4,11 +4,12 @@
 //! itself.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
 
 use esl_vm::host::{Inbox, Incoming};
 
 use super::editor::Editor;
-use super::lines::{Line, Lines, Pipe};
+use super::lines::{CompletionRequest, Line, Lines, Pipe, WordCompletion};
 use super::screen::PromptScreen;
 use super::terminal::Terminal;
 
@@ -18,9 +19,12 @@ enum Request {
     Line(&'static str),
     /// Add a form to the history.
     Remember(String),
-    /// Take the names to complete from.
-    Learn(Vec<String>),
 }
+
+/// Name of the file with the history of sessions in which forms are typed.
+const HISTORY: &str = ".esl-history";
+/// Time that the machine has to say how something can be completed.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Source of the lines of a session.
 pub(super) struct Typing {
@@ -33,6 +37,19 @@ pub(super) struct Typing {
     /// Settings of the terminal when the session began.
     terminal: Option<Terminal>,
     screen: PromptScreen,
+}
+
+/// Asks the session, which waits for a line, how a word can be completed: by a command at the beginning of a
+/// line, or else by a name.
+fn completions(session: &Sender<Line>, bell: &Inbox, before: &str, word: &str) -> Vec<WordCompletion> {
+    let (reply, replied) = channel();
+    let is_command = before.trim().is_empty() && word.starts_with(':');
+    let request = CompletionRequest { word: word.into(), is_command, reply };
+    if session.send(Line::Completing(request)).is_err() {
+        return Vec::new();
+    }
+    bell.put(Incoming::Stop);
+    replied.recv_timeout(PATIENCE).unwrap_or_default()
 }
 
 impl Typing {
@@ -48,8 +65,13 @@ impl Typing {
         let terminal = if is_interactive { Terminal::now() } else { None };
         let above = screen.clone();
         std::thread::Builder::new().name("typing".into()).spawn(move || {
-            let mut source: Box<dyn Lines> =
-                if is_interactive { Box::new(Editor::new(&above)) } else { Box::new(Pipe) };
+            let (asked_of, bell) = (answer.clone(), inbox.clone());
+            let complete = move |before: &str, word: &str| completions(&asked_of, &bell, before, word);
+            let mut source: Box<dyn Lines> = if is_interactive {
+                Box::new(Editor::new(&above, HISTORY, Box::new(complete)))
+            } else {
+                Box::new(Pipe)
+            };
             while let Ok(request) = asked.recv() {
                 match request {
                     Request::Line(prompt) => {
@@ -60,7 +82,6 @@ impl Typing {
                         inbox.put(Incoming::Stop);
                     }
                     Request::Remember(form) => source.remember(&form),
-                    Request::Learn(names) => source.learn(names),
                 }
             }
         })?;
@@ -99,17 +120,12 @@ impl Typing {
         self.request(Request::Remember(form.into()));
     }
 
-    /// Hands over the names to complete from.
-    pub(super) fn learn(&self, names: Vec<String>) {
-        self.request(Request::Learn(names));
-    }
-
     /// Takes the requested line, if it has come.
     pub(super) fn take(&self) -> Option<Line> {
         self.lines.try_recv().ok()
     }
 
-    /// Waits for the requested line.
+    /// Waits for the requested line, or for a request to complete a word before it.
     pub(super) fn wait(&self) -> Line {
         self.lines.recv().unwrap_or_else(|_| Line::Failed("the thread that reads it has ended".into()))
     }

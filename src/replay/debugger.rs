@@ -373,6 +373,13 @@ impl Debugger {
         Ok(format!("tick {ticks}, turn {turns}, {:.6} s: {who}", time as f64 / 1e9))
     }
 
+    /// Returns the names that are known at this place, in upper case.
+    pub(super) fn names(&self) -> Vec<String> {
+        let mut names = self.rerun.machine.accessible_names();
+        names.sort_unstable();
+        names
+    }
+
     /// Shows what the program has written up to here and was not shown before.
     pub(super) fn show_output(&mut self) {
         lock(&self.shown).show(self.show);

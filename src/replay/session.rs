@@ -1,8 +1,9 @@
 //! The commands with which a person, or a script, moves through a replay.
 #![allow(clippy::print_stdout, reason = "a session talks with people")]
 
-use std::io::{BufRead, IsTerminal, Write};
+use std::io::{IsTerminal, Write};
 use std::str::FromStr;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::breakpoint::{Breakpoint, Target};
 use super::command::show;
@@ -10,23 +11,35 @@ use super::debugger::Debugger;
 use super::file::Recorded;
 use super::rerun::{Replayed, RerunError};
 use crate::command::{DIVERGED, SUCCESS, complain};
+use crate::repl::commands::{SessionCommand, completions_of, help, nearest};
+use crate::repl::editor::Editor;
+use crate::repl::lines::{Line, Lines, Pipe, WordCompletion};
+use crate::repl::screen::PromptScreen;
 
-const HELP: &str = "\
-step [N]           go N ticks on; a tick is a call or a turn of a loop
-turn [N]           go to the beginning of the next turn, or the N-th
-continue           go on to the next breakpoint, or the end
-until PLACE        go to tick:N, turn:N, time:SECONDS, record:N, or on to the next failure
-back [N]           go N ticks back
-back turn [N]      go back to the beginning of the turn, or of the N-th before it
-reverse-continue   go back to the last breakpoint, or the beginning
-break [WHAT]       stop at failure, failure:CAUSE, task:NAME, fact:PATTERN or function:NAME
-where              say where the replay stands
-tasks              show the tasks, and what they wait for
-bt [TASK]          show the frames of a task, by its name or number
-facts QUERY        show the answers to a query: facts (door ?name open)
-print FORM         show the values of a form; nothing is changed by it
-help, quit
-";
+/// The commands.
+const COMMANDS: &[SessionCommand] = &[
+    row(&["step", "s"], "[N]", "goes N ticks on; a tick is a call or a turn of a loop"),
+    row(&["turn"], "[N]", "goes to the beginning of the next turn, or the N-th"),
+    row(&["continue", "c"], "", "goes on to the next breakpoint, or the end"),
+    row(&["until"], "PLACE", "goes to tick:N, turn:N, time:SECONDS, record:N, or on to the next failure"),
+    row(&["back", "b"], "[N]", "goes N ticks back; `back turn N` goes back to the beginning of a turn"),
+    row(&["reverse-continue", "rc"], "", "goes back to the last breakpoint, or the beginning"),
+    row(&["break"], "[WHAT]", "stops at failure, failure:CAUSE, task:NAME, fact:PATTERN or function:NAME"),
+    row(&["where"], "", "says where the replay stands"),
+    row(&["tasks"], "", "shows the tasks, and what they wait for"),
+    row(&["bt"], "[TASK]", "shows the frames of a task, by its name or number"),
+    row(&["facts"], "QUERY", "shows the answers to a query: facts (door ?name open)"),
+    row(&["print", "p"], "FORM", "shows the values of a form; nothing is changed by it"),
+    row(&["help"], "", "shows this list"),
+    row(&["quit", "q", "exit"], "", "ends, as Ctrl-D does"),
+];
+
+const fn row(names: &'static [&'static str], arguments: &'static str, does: &'static str) -> SessionCommand {
+    SessionCommand { names, arguments, does }
+}
+
+/// Name of the file with the commands of earlier sessions, in the person's home.
+const HISTORY: &str = ".esl-replay-history";
 
 /// Replays a run up to the target or the first breakpoint, and obeys the lines of standard input. Returns the
 /// exit status.
@@ -44,14 +57,29 @@ pub(super) fn run(
         None => session.go_on()?,
     }
     let is_interactive = std::io::stdin().is_terminal();
-    let mut lines = std::io::stdin().lock().lines();
+    let names = Arc::new(Mutex::new(Vec::new()));
+    let mut lines: Box<dyn Lines> = if is_interactive {
+        println!("`help` lists the commands, TAB completes, Ctrl-D ends");
+        let known = names.clone();
+        let complete = move |before: &str, word: &str| completions(before, word, &lock(&known));
+        Box::new(Editor::new(&PromptScreen::default(), HISTORY, Box::new(complete)))
+    } else {
+        Box::new(Pipe)
+    };
     loop {
-        if is_interactive {
-            print!("(replay) ");
-        }
         _ = std::io::stdout().flush();
-        // Input that cannot be read has ended.
-        let Some(Ok(line)) = lines.next() else { break };
+        if is_interactive {
+            *lock(&names) = session.debugger.names();
+        }
+        let line = match lines.next("(replay) ") {
+            Line::Text(line) => line,
+            Line::Dropped | Line::Completing(_) => continue,
+            // Input that cannot be read has ended.
+            Line::End | Line::Signalled(_) | Line::Failed(_) => break,
+        };
+        if !line.trim().is_empty() {
+            lines.remember(line.trim());
+        }
         if !session.obey(line.trim())? {
             break;
         }
@@ -60,6 +88,26 @@ pub(super) fn run(
         Some(Replayed::Diverged(_)) => DIVERGED,
         _ => SUCCESS,
     })
+}
+
+fn lock(names: &Mutex<Vec<String>>) -> std::sync::MutexGuard<'_, Vec<String>> {
+    // The names are whole at every moment.
+    names.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Returns how a word can be completed: the first of a line by a command, another one by a name of the program.
+fn completions(before: &str, word: &str, names: &[String]) -> Vec<WordCompletion> {
+    if before.trim().is_empty() {
+        return completions_of(word, COMMANDS);
+    }
+    // As in `break function:NAME`.
+    let (prefix, stem) =
+        word.rsplit_once(':').map_or(("", word), |(_, stem)| word.split_at(word.len() - stem.len()));
+    let stem = stem.to_uppercase();
+    let begun = names.iter().filter(|name| name.starts_with(&stem));
+    begun
+        .map(|name| WordCompletion { text: prefix.to_string() + &name.to_lowercase(), about: String::new() })
+        .collect()
 }
 
 struct Session {
@@ -123,8 +171,11 @@ impl Session {
             "print" | "p" if argument.is_empty() => expected("a form"),
             "print" | "p" => print!("{}", self.debugger.evaluate(argument)?),
             "quit" | "q" | "exit" => return Ok(false),
-            "help" => print!("{HELP}"),
-            _ => println!("There is no command `{command}`; `help` lists them."),
+            "help" => print!("{}", help(COMMANDS)),
+            _ => match nearest(command, COMMANDS) {
+                Some(name) => println!("There is no command `{command}`; did you mean `{name}`?"),
+                None => println!("There is no command `{command}`; `help` lists them."),
+            },
         }
         Ok(true)
     }

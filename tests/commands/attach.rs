@@ -65,7 +65,7 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
     assert_eq!((output, status), (expected, Some(0)));
     // Another session has a history of its own, and sees what the first has changed.
     let (output, _) = session(&socket, "*\n(setq *speed* 8)\n(setq + 1)\n:signal news 1 (2)\n:quit\n");
-    assert_eq!(output, "NIL\n8\n1\n");
+    assert_eq!(output, "NIL\n8\n1\n; NEWS is signalled with 1 (2)\n");
     // The run ends with all that was done to it, and takes its socket away.
     let finished = run.finish();
     assert_eq!(
@@ -78,6 +78,39 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
     let (output, status) = session(&socket, "");
     assert!(output.starts_with(&format!("eslvm: no run can be reached at {socket}")), "{output}");
     assert_eq!(status, Some(2));
+}
+
+/// A line with a colon is a command, and each command says what it has done.
+#[test]
+fn commands_say_what_they_do() {
+    let folder = Folder::new("attach_commands");
+    let socket = folder.join("s");
+    let program = "(spawn (:name 'driver :daemon t) (loop (sleep 1000))) (read-line *standard-input* nil)";
+    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
+    run.said("; operators attach with eslvm attach ");
+    let (number, _) =
+        session(&socket, "(princ (esl::%task-number (find 'driver (list-tasks) :key #'task-name)))\n");
+    let number = number.lines().next().unwrap_or_default().to_string();
+    let (output, status) = session(
+        &socket,
+        &format!(
+            ":abrot {number}\n:foo\n':foo\n(list :foo)\n:pause\n:pause\n:continue\n:continue\n:resume {number}\n\
+             :suspend {number}\n(loop until (eq (task-status (find 'driver (list-tasks) :key #'task-name)) :suspended) do (sleep 0.01))\n\
+             :resume {number}\n:abort {number}\nexit\n"
+        ),
+    );
+    let expected = format!(
+        "; no command `:abrot`; did you mean `:abort`?\n\
+         ; no command `:foo`; `:help` lists them, and `':foo` evaluates the keyword\n\
+         :FOO\n(:FOO)\n\
+         ; all tasks stand still; the clock runs on, and `:continue` ends the pause\n; the run is paused already\n\
+         ; the tasks go on\n; the run is not paused\n; task DRIVER, number {number}, is not suspended\n\
+         ; task DRIVER, number {number}, is suspended, with the tasks that it has made\nNIL\n\
+         ; task DRIVER, number {number}, is resumed, with the tasks that it has made\n\
+         ; task DRIVER, number {number}, is aborted now\n"
+    );
+    assert_eq!((output, status), (expected, Some(0)));
+    assert_eq!(run.end(), Some(0));
 }
 
 #[test]
@@ -96,18 +129,18 @@ fn who_leaves_takes_what_it_evaluates_with_it() {
     stream
         .write_all(&packet(&format!("(:emacs-rex (esl:evaluate \"{form}\") nil t 1)")))
         .expect("it is taken");
-    let (output, _) = session(&socket, "(loop until *begun* do (sleep 0.01))\n:seen\n");
+    let (output, _) = session(&socket, "(loop until *begun* do (sleep 0.01))\n':seen\n");
     assert_eq!(output, "NIL\n:SEEN\n");
     drop(stream);
     assert_eq!(run.finish().output, "ENDED");
 }
 
-fn packet(text: &str) -> Vec<u8> {
+pub(crate) fn packet(text: &str) -> Vec<u8> {
     format!("{:06x}{text}", text.len()).into_bytes()
 }
 
 /// Connects, says a secret, and sends packets; returns the texts of so many answers.
-fn ask(address: &str, secret: &str, requests: &[String]) -> Vec<String> {
+pub(crate) fn ask(address: &str, secret: &str, requests: &[String]) -> Vec<String> {
     let mut stream = TcpStream::connect(address).expect("the run listens");
     stream.set_read_timeout(Some(PATIENCE)).expect("it can be set");
     let mut bytes = packet(&format!("\"{secret}\""));
@@ -128,7 +161,7 @@ fn ask(address: &str, secret: &str, requests: &[String]) -> Vec<String> {
 }
 
 /// Starts the program with a listener at a port, and secrets for the three roles.
-fn start_with_secrets(folder: &Folder) -> (Operated, String) {
+pub(crate) fn start_with_secrets(folder: &Folder) -> (Operated, String) {
     let secrets = folder
         .file("secrets", "observe observe-0123456789\ncommand command-0123456789\npatch patch-0123456789\n");
     use std::os::unix::fs::PermissionsExt;

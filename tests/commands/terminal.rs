@@ -10,6 +10,8 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{Termios, tcgetattr};
 
 use crate::eslvm;
+use crate::folder::Folder;
+use crate::operate::Operated;
 
 /// Output of a session, as it comes.
 struct Output {
@@ -60,13 +62,17 @@ struct Session {
 
 impl Session {
     fn begin() -> Session {
+        Session::of(&["repl"])
+    }
+
+    fn of(arguments: &[&str]) -> Session {
         let person = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("there are terminals");
         grantpt(&person).and_then(|()| unlockpt(&person)).expect("it is ours");
         let name = ptsname(&person, Vec::new()).expect("it has a name").into_string().expect("text");
         let terminal = File::options().read(true).write(true).open(name).expect("it can be opened");
         let before = tcgetattr(&terminal).expect("it is a terminal");
         let stdio = || Stdio::from(terminal.try_clone().expect("it can be shared"));
-        let child = eslvm(&["repl"])
+        let child = eslvm(arguments)
             .env("TERM", "xterm")
             .env("HOME", env!("CARGO_TARGET_TMPDIR"))
             .stdin(stdio())
@@ -108,4 +114,59 @@ fn what_is_typed_ahead_is_kept() {
     }
     person.write_all(b"(exit 3)\r").expect("it is read");
     assert_eq!(child.wait().expect("it ends").code(), Some(3));
+}
+
+/// TAB lists the names that a word can become, with what there is to say about them, and completes it when there
+/// is one only.
+#[test]
+fn a_word_is_completed() {
+    let Session { mut person, mut child, mut output, .. } = Session::begin();
+    output.await_text("; :help lists the commands, TAB completes, Ctrl-D ends");
+    output.await_text("? ");
+    let mut write = |text: &str| person.write_all(text.as_bytes()).expect("it is read");
+    write("(list 'wait-for-\t");
+    output.await_text("wait-for-event");
+    output.await_text("Waits until one of");
+    output.await_text("wait-for-task");
+    write("tas\t)\r");
+    output.await_text("(WAIT-FOR-TASK)");
+    write("(defun my-own-function () \"Does what is mine.\" 1)\r");
+    output.await_text("MY-OWN-FUNCTION");
+    write("(my-o\t)\r");
+    output.await_text("1");
+    write(":tas\t\r");
+    output.await_text("There are no tasks.");
+    write("help\r");
+    output.await_text(":load FILE");
+    write("exit\r");
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+}
+
+#[test]
+fn sessions_elsewhere_are_edited_too() {
+    let folder = Folder::new("terminal_attach");
+    let (socket, recording) = (folder.join("s"), folder.join("run.eslj"));
+    let program = "(defun drive-home () 7) (read-line *standard-input* nil)";
+    let mut run = Operated::start(&folder, program, &["--listen", &socket, "--record", &recording]);
+    run.said("; operators attach with eslvm attach ");
+    let Session { mut person, mut child, mut output, .. } = Session::of(&["attach", &socket]);
+    output.await_text("; :help lists the commands");
+    output.await_text("? ");
+    person.write_all(b"(list (drive-h\t))\r").expect("it is read");
+    output.await_text("(7)");
+    person.write_all(b":undo\t\r").expect("it is read");
+    output.await_text("; there is no patch to be undone");
+    // Ctrl-D.
+    person.write_all(b"\x04").expect("it is read");
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+    assert_eq!(run.end(), Some(0));
+    let Session { mut person, mut child, mut output, .. } =
+        Session::of(&["replay", "--until", "tick:0", &recording]);
+    output.await_text("(replay) ");
+    person.write_all(b"whe\t\r").expect("it is read");
+    output.await_text("tick 0");
+    person.write_all(b"stpe\r").expect("it is read");
+    output.await_text("There is no command `stpe`; did you mean `step`?");
+    person.write_all(b"\x04").expect("it is read");
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
 }
