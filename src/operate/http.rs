@@ -1,13 +1,12 @@
 //! HTTP for the servers of a run: connections, and answers.
 //!
-//! Guarantees: at most [`CONNECTIONS`] at a time; heads are bounded, in size and in the time that they take;
-//! a request must name the server by an address or as `localhost`, or come over TLS, so that no page of
-//! another site reaches it by a name of its own.
+//! Guarantees: connections are those of a [`Lobby`], until a handler settles them; heads are bounded, in size
+//! and in the time that they take; a request must name the server by an address or as `localhost`, or come over
+//! TLS, so that no page of another site reaches it by a name of its own.
 
 use std::convert::Infallible;
 use std::net::{IpAddr, TcpListener};
 use std::pin::Pin;
-use std::sync::Arc;
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
@@ -23,10 +22,9 @@ use hyper::service::service_fn;
 use hyper::{Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::sync::{Notify, Semaphore};
 
-/// Most connections at a time.
-const CONNECTIONS: usize = 64;
+use super::lobby::{Lobby, LobbyVisit, notice_absence};
+
 /// Most bytes of the head of a request.
 const HEAD: usize = 16 << 10;
 /// Time that a peer has for the head of a request.
@@ -35,69 +33,68 @@ const HEAD_TIME: Duration = Duration::from_secs(10);
 /// Body of an answer.
 pub(super) type HttpBody = BoxBody<Bytes, Infallible>;
 
-/// Ends the connection of a request, whatever is on its way.
-#[derive(Clone, Default)]
-pub(super) struct Hangup(Arc<Notify>);
-
-impl Hangup {
-    /// Ends the connection.
-    pub(super) fn hang_up(&self) {
-        self.0.notify_one();
-    }
-}
-
-/// Serves requests at a listener, over TLS if it has an identity, on the event loop.
+/// Serves requests at a listener, over TLS if it has an identity, on the event loop. Connections come into the
+/// lobby.
 ///
 /// # Errors
 /// The reason, if there is no event loop.
 pub(super) fn serve<F, R>(
     listener: TcpListener,
     identity: Option<TlsIdentity>,
+    lobby: Lobby,
     handler: F,
 ) -> Result<(), NoEventLoop>
 where
-    F: Fn(Request<Incoming>, Hangup) -> R + Clone + Send + Sync + 'static,
+    F: Fn(Request<Incoming>, LobbyVisit) -> R + Clone + Send + Sync + 'static,
     R: Future<Output = Response<HttpBody>> + Send + 'static,
 {
     esl_world::spawn(async move {
         // It has been made for this, so the event loop takes it.
         let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-        let room = Arc::new(Semaphore::new(CONNECTIONS));
         loop {
-            let Ok(permit) = room.clone().acquire_owned().await else { return };
-            let Ok((stream, _)) = listener.accept().await else {
+            let Ok((stream, address)) = listener.accept().await else {
                 // The system lacks something, such as descriptors; others may give it back.
                 tokio::time::sleep(Duration::from_millis(100)).await;
                 continue;
             };
+            notice_absence(&stream);
+            let visit = lobby.enter(address.ip());
             let (handler, identity) = (handler.clone(), identity.clone());
             tokio::spawn(async move {
-                match identity {
-                    None => converse(stream, false, handler).await,
-                    Some(identity) => {
-                        // Who does not speak TLS is let go.
-                        let secured = tokio::time::timeout(HEAD_TIME, identity.accept(stream)).await;
-                        if let Ok(Ok(stream)) = secured {
-                            converse(stream, true, handler).await;
+                let own = visit.clone();
+                let serve = async move {
+                    match identity {
+                        None => converse(stream, false, visit, handler).await,
+                        Some(identity) => {
+                            // Who does not speak TLS is let go.
+                            let secured = tokio::time::timeout(HEAD_TIME, identity.accept(stream)).await;
+                            if let Ok(Ok(stream)) = secured {
+                                converse(stream, true, visit, handler).await;
+                            }
                         }
                     }
+                };
+                tokio::select! {
+                    () = serve => {}
+                    () = own.ended() => {}
                 }
-                drop(permit);
             });
         }
     })
 }
 
 /// Answers the requests of a connection, until it ends.
-async fn converse<F, R>(stream: impl AsyncRead + AsyncWrite + Unpin, is_secured: bool, handler: F)
-where
-    F: Fn(Request<Incoming>, Hangup) -> R + Clone,
+async fn converse<F, R>(
+    stream: impl AsyncRead + AsyncWrite + Unpin,
+    is_secured: bool,
+    visit: LobbyVisit,
+    handler: F,
+) where
+    F: Fn(Request<Incoming>, LobbyVisit) -> R + Clone,
     R: Future<Output = Response<HttpBody>>,
 {
-    let hangup = Hangup::default();
-    let end = hangup.clone();
     let service = service_fn(move |request| {
-        let answer = answer(request, is_secured, hangup.clone(), handler.clone());
+        let answer = answer(request, is_secured, visit.clone(), handler.clone());
         async move { Ok::<_, Infallible>(answer.await) }
     });
     let connection = http1::Builder::new()
@@ -105,11 +102,8 @@ where
         .header_read_timeout(HEAD_TIME)
         .max_buf_size(HEAD)
         .serve_connection(TokioIo::new(stream), service);
-    tokio::select! {
-        // What the peer does wrong ends its connection.
-        _ = connection => {}
-        () = end.0.notified() => {}
-    }
+    // What the peer does wrong ends its connection.
+    drop(connection.await);
 }
 
 /// Takes bytes as those that come over a connection, and calls `judge` with the head and the body of each
@@ -173,18 +167,18 @@ impl hyper::rt::Write for Overheard<'_> {
 async fn answer<F, R>(
     request: Request<Incoming>,
     is_secured: bool,
-    hangup: Hangup,
+    visit: LobbyVisit,
     handler: F,
 ) -> Response<HttpBody>
 where
-    F: Fn(Request<Incoming>, Hangup) -> R,
+    F: Fn(Request<Incoming>, LobbyVisit) -> R,
     R: Future<Output = Response<HttpBody>>,
 {
     // Another site that has its name lead here lacks the certificate for that.
     if !is_secured && !request.headers().get(HOST).is_some_and(is_own_name) {
         return plain(StatusCode::MISDIRECTED_REQUEST, "this server is reached by its address only\n");
     }
-    handler(request, hangup).await
+    handler(request, visit).await
 }
 
 /// Returns whether a `Host` header names a server by its address, or as `localhost`.

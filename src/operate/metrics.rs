@@ -8,6 +8,7 @@ use esl_world::{NoEventLoop, TlsIdentity};
 use hyper::{Method, StatusCode};
 
 use super::http::{self, plain, with};
+use super::lobby::Lobby;
 use super::scope::RunScope;
 
 /// Serves the figures at `/metrics`.
@@ -19,7 +20,7 @@ pub(super) fn serve(
     identity: Option<TlsIdentity>,
     scope: RunScope,
 ) -> Result<(), NoEventLoop> {
-    http::serve(listener, identity, move |request, _| {
+    http::serve(listener, identity, Lobby::default(), move |request, _| {
         let scope = scope.clone();
         async move {
             if request.uri().path() != "/metrics" {

@@ -23,7 +23,7 @@
 //! let options = Options::parse_from(["rover", "--metrics", "0"]);
 //! let mut machine = machine(Config::default(), Box::new(VirtualHost::new()))?;
 //! // Prints the address at which the figures are. They are served until this is dropped.
-//! let served = options.operate.begin(&mut machine).expect("any port will do");
+//! let served = options.operate.begin(&mut machine, "rover.esl").expect("any port will do");
 //! let program = compile(&[Source::new("rover.esl", "(sleep 60)")]).program.expect("there are no errors");
 //! begin(&mut machine, &program)?;
 //! machine.run(u64::MAX);
@@ -34,6 +34,7 @@
 
 pub(crate) mod attach;
 mod http;
+mod lobby;
 mod metrics;
 mod monitor;
 #[doc(hidden)]
@@ -45,13 +46,17 @@ mod slime;
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use clap::Args;
+use esl_vm::host::{Incoming, SurveyRequest};
 use esl_vm::vm::Vm;
 use esl_world::{NoEventLoop, TlsIdentity};
 
 use crate::command::{USAGE, complain};
-use attach::Entrance;
+use crate::program::Ended;
+use attach::{Entrance, SessionsHandle};
+use monitor::MonitorHandle;
 use scope::RunScope;
 use secrets::{OperatorRole, Secrets};
 
@@ -83,10 +88,67 @@ pub struct OperateOptions {
     key: Option<PathBuf>,
 }
 
-/// What is to be undone when a run is over.
-#[derive(Debug, Default)]
+/// What serves a run. When the run is over, it tells those who watch, and is dropped.
+#[derive(Default)]
 pub struct ServedRun {
     socket: Option<PathBuf>,
+    monitor: Option<MonitorHandle>,
+    sessions: Option<SessionsHandle>,
+}
+
+impl std::fmt::Debug for ServedRun {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ServedRun").field("socket", &self.socket).finish_non_exhaustive()
+    }
+}
+
+/// Time that viewers and operators have to hear how a run has ended.
+const FAREWELL: Duration = Duration::from_secs(1);
+
+impl ServedRun {
+    /// Tells viewers of the monitor and attached operators how the run of a machine has ended, with this exit
+    /// status and report. Those who do not listen are not waited for.
+    pub fn end(&self, machine: &Vm, ended: Ended, status: u8, report: Option<&str>) {
+        let how = match ended {
+            Ended::Normally(_) => "",
+            Ended::Failed => ": a failure or an abort has ended the main task",
+            Ended::Deadlocked => ": no task could ever run again",
+            Ended::BudgetSpent => ": its budget of ticks is spent",
+            Ended::HeapExhausted => ": its memory is exhausted",
+            Ended::Signalled(_) => ": a signal of the process has ended it",
+        };
+        let said = format!("the run has ended with status {status}{how}");
+        let told_monitor = self.monitor.as_ref().map(|monitor| {
+            let request = SurveyRequest { failures_after: Some(0), data: true, ..SurveyRequest::default() };
+            monitor.end(
+                RunEnd { status, said: said.clone(), report: report.map(String::from) },
+                machine.survey(&request),
+            );
+        });
+        let told_sessions = self.sessions.as_ref().map(|sessions| sessions.end(&said));
+        if told_monitor.is_none() && told_sessions.is_none() {
+            return;
+        }
+        let deadline = Instant::now() + FAREWELL;
+        let is_told = || {
+            self.monitor.as_ref().is_none_or(MonitorHandle::is_told)
+                && self.sessions.as_ref().is_none_or(SessionsHandle::is_told)
+        };
+        while !is_told() && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+/// How a run has ended.
+#[derive(Clone, Debug)]
+struct RunEnd {
+    /// Its exit status.
+    status: u8,
+    /// What is said of it.
+    said: String,
+    /// The last report.
+    report: Option<String>,
 }
 
 impl Drop for ServedRun {
@@ -109,14 +171,16 @@ fn parse_address(text: &str) -> Result<SocketAddr, &'static str> {
 }
 
 impl OperateOptions {
-    /// Begins to serve what was asked for, before the machine runs. Returns what is to be dropped after the
-    /// run.
+    /// Begins to serve what was asked for, before the machine runs a program of this name. Returns what is to be
+    /// told of the end, and dropped after the run.
     ///
     /// # Errors
     /// The exit status, after a message.
-    pub fn begin(&self, machine: &mut Vm) -> Result<ServedRun, u8> {
-        let scope = RunScope::new(machine.inbox());
+    pub fn begin(&self, machine: &mut Vm, program: &str) -> Result<ServedRun, u8> {
+        let scope = RunScope::new(machine);
         let mut served = ServedRun::default();
+        // Whether an operator may come who can signal an input.
+        let mut may_signal = false;
         if self.metrics.is_some() || self.listen.is_some() || self.monitor.is_some() {
             watch_closely(machine);
         }
@@ -131,6 +195,7 @@ impl OperateOptions {
         if let Some(address) = self.monitor {
             self.keeps_secret(address)?;
             let secrets = self.secrets()?;
+            may_signal |= secrets.may_signal();
             let (listener, address) = listen(address)?;
             for role in [OperatorRole::Observe, OperatorRole::Command] {
                 if let (Some(secret), None) = (secrets.of(role), &self.secrets) {
@@ -140,13 +205,16 @@ impl OperateOptions {
             if self.secrets.is_some() {
                 eprintln!("; monitor at {scheme}://{address}/#token=SECRET");
             }
-            serve(monitor::serve(listener, identity.clone(), scope.clone(), secrets))?;
+            let program = program.to_string();
+            let handle = monitor::serve(listener, identity.clone(), scope.clone(), secrets, program);
+            served.monitor = Some(serve(handle)?);
         }
         if let Some(place) = &self.listen {
             let door = match parse_address(place) {
                 Ok(address) => {
                     self.keeps_secret(address)?;
                     let secrets = self.secrets()?;
+                    may_signal |= secrets.may_signal();
                     let (listener, address) = listen(address)?;
                     let flag = if identity.is_some() { "--tls " } else { "" };
                     eprintln!("; operators attach with eslvm attach {flag}{address}");
@@ -158,10 +226,14 @@ impl OperateOptions {
                     let door = listen_at_path(&path)?;
                     eprintln!("; operators attach with eslvm attach {place}");
                     served.socket = Some(path);
+                    may_signal = true;
                     door
                 }
             };
-            serve(attach::serve(machine, door, scope))?;
+            served.sessions = Some(serve(attach::serve(machine, door, scope))?);
+        }
+        if may_signal {
+            machine.inbox().put(Incoming::Attended);
         }
         Ok(served)
     }
@@ -261,7 +333,7 @@ fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), u8> {
     })
 }
 
-fn serve(served: Result<(), NoEventLoop>) -> Result<(), u8> {
+fn serve<T>(served: Result<T, NoEventLoop>) -> Result<T, u8> {
     served.map_err(|error| {
         complain(format_args!("the event loop cannot be started: {error}"));
         USAGE

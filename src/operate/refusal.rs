@@ -49,6 +49,13 @@ pub(super) enum OperatorRefusal {
     NoRow(usize),
     /// No task has this number.
     NoTask(u64),
+    /// There are as many sessions of this role as there may be.
+    TooManySessions {
+        /// The role.
+        role: OperatorRole,
+        /// Most sessions of one role.
+        most: usize,
+    },
     /// Too many requests of the session are under way.
     TooManyRequests,
     /// The machine does not answer.
@@ -103,6 +110,12 @@ impl fmt::Display for OperatorRefusal {
             OperatorRefusal::NotData { text, reason } => write!(f, "`{text}` is no data: {reason}"),
             OperatorRefusal::NoRow(row) => write!(f, "there is no row {row} in the table of tasks"),
             OperatorRefusal::NoTask(number) => write!(f, "there is no task {number}"),
+            OperatorRefusal::TooManySessions { role, most } => {
+                write!(
+                    f,
+                    "{most} sessions of the role {role} are open, the most that may be: end one of them"
+                )
+            }
             OperatorRefusal::TooManyRequests => f.write_str("too many requests are under way"),
             OperatorRefusal::Silent => f.write_str("the machine does not answer"),
             OperatorRefusal::Late => f.write_str("the run has not done it yet"),

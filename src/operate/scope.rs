@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use esl_vm::host::{Inbox, Look, Sender, Survey, SurveyRequest};
+use esl_vm::vm::Vm;
 use tokio::sync::oneshot;
 
 /// Longest time that a survey is waited for. A machine that runs a critical section answers late.
@@ -12,12 +13,19 @@ const PATIENCE: Duration = Duration::from_secs(10);
 #[derive(Clone)]
 pub(super) struct RunScope {
     inbox: Inbox,
+    /// Most bytes of its objects.
+    memory: usize,
 }
 
 impl RunScope {
-    /// Creates a view of the run with this inbox.
-    pub(super) fn new(inbox: Inbox) -> RunScope {
-        RunScope { inbox }
+    /// Creates a view of the run of a machine.
+    pub(super) fn new(machine: &Vm) -> RunScope {
+        RunScope { inbox: machine.inbox(), memory: machine.config().memory }
+    }
+
+    /// Returns the most bytes that the objects of the run may take.
+    pub(super) fn memory(&self) -> usize {
+        self.memory
     }
 
     /// Returns one who may signal and ask something.

@@ -157,6 +157,11 @@ impl Secrets {
         found
     }
 
+    /// Returns whether any of them is for more than to look.
+    pub(super) fn may_signal(&self) -> bool {
+        self.0.iter().any(|(role, _)| *role >= OperatorRole::Command)
+    }
+
     /// Returns the first secret of a role, if it has one.
     pub(super) fn of(&self, role: OperatorRole) -> Option<&str> {
         self.0.iter().find(|(other, _)| *other == role).map(|(_, secret)| secret.as_str())

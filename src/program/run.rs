@@ -38,6 +38,8 @@ pub enum Ended {
 pub struct Summary {
     /// Way in which the run ended.
     pub ended: Ended,
+    /// Report of the failure or the deadlock that has ended it.
+    pub report: Option<String>,
     /// Ticks of all tasks.
     pub ticks: u64,
     /// Tasks made, the main task included.
@@ -242,10 +244,12 @@ fn run_as(
 /// [`RunOutcome::TicksUsed`]: reports what is to be reported, aborts the tasks that are left, and runs their
 /// cleanups.
 pub fn finish(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Summary {
+    let report = machine.report(main);
     let ended = end(machine, main, outcome);
+    let report = report.or_else(|| (ended == Ended::Deadlocked).then(|| machine.deadlock_report()));
     end_rest(machine);
     let (tasks, turns, switches) = machine.tasks_turns_and_switches();
-    Summary { ended, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() }
+    Summary { ended, report, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() }
 }
 
 /// Aborts the tasks that are left at the end of a run, runs their cleanups, and says what does not end.

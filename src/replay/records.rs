@@ -63,6 +63,7 @@ mod arrival {
     pub(super) const WATCH: u8 = 14;
     pub(super) const SENDER_CAME: u8 = 15;
     pub(super) const SENDER_LEFT: u8 = 16;
+    pub(super) const ATTENDED: u8 = 17;
 }
 
 /// Writes a record.
@@ -310,6 +311,7 @@ fn incoming(out: &mut ByteWriter, incoming: &Incoming) {
         Incoming::Watch => out.byte(arrival::WATCH),
         Incoming::SenderCame => out.byte(arrival::SENDER_CAME),
         Incoming::SenderLeft => out.byte(arrival::SENDER_LEFT),
+        Incoming::Attended => out.byte(arrival::ATTENDED),
     }
 }
 
@@ -454,6 +456,7 @@ fn read_incoming(from: &mut ByteReader<'_>) -> Option<Incoming> {
         arrival::WATCH => Incoming::Watch,
         arrival::SENDER_CAME => Incoming::SenderCame,
         arrival::SENDER_LEFT => Incoming::SenderLeft,
+        arrival::ATTENDED => Incoming::Attended,
         _ => return None,
     })
 }

@@ -133,6 +133,7 @@ fn records() -> Vec<NotedRecord> {
         Incoming::Watch,
         Incoming::SenderCame,
         Incoming::SenderLeft,
+        Incoming::Attended,
     ];
     let errors = [HostError::BrokenPipe, HostError::NotFound, HostError::Refused, HostError::Exists];
     let mut all = vec![

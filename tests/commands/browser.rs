@@ -98,6 +98,12 @@ impl Browser {
         until(script, || self.value(script) == true);
     }
 
+    /// Makes the page so many pixels wide.
+    fn resize(&mut self, width: u32) {
+        let metrics = json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false });
+        self.ask("Emulation.setDeviceMetricsOverride", metrics);
+    }
+
     fn press(&mut self, key: &str) {
         self.value(&format!("dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}' }})), true"));
     }
@@ -123,7 +129,14 @@ fn the_page_shows_a_run_and_commands_it() {
     browser.until(
         "last !== null && last.total === 5003 && document.querySelectorAll('.row.cycle').length === 2",
     );
+    browser.until("document.title === 'program.esl – ESL monitor'");
     browser.until("document.getElementById('alarm').textContent.startsWith('2 tasks wait for each other')");
+    // Tasks that are alike have one row, with a link to a row for each.
+    browser.until("last.matching === 4 && last.rows.at(-1).count === 5000");
+    browser.value("document.querySelector('#rows a[title]').click(), true");
+    browser.until("last.matching === 5000 && document.getElementById('filter').value === 'task IDLER'");
+    browser.value("location.hash = address('', true), true");
+    browser.until("last.matching === 5003");
     browser.until("document.getElementById('t-failures').textContent.includes(':SLIP')");
     // What the program calls itself is text.
     browser.until("document.querySelectorAll('img, b b').length === 0 && document.querySelectorAll('.row').length < 130");
@@ -143,6 +156,9 @@ fn the_page_shows_a_run_and_commands_it() {
     browser.until("document.getElementById('t-task').textContent.includes('waits for resource LEG')");
     browser.press("a");
     browser.until("document.getElementById('abort').textContent === 'Really abort it'");
+    // Filters are links.
+    browser.value("[...document.querySelectorAll('#filters a')].find(a => a.textContent.startsWith('in a circle')).click(), true");
+    browser.until("last.matching === 2 && document.getElementById('filter').value === 'cycle'");
     browser.press("a");
     browser
         .until("last.cycle === 0 && document.getElementById('t-task').textContent.includes('It has ended')");
@@ -152,4 +168,68 @@ fn the_page_shows_a_run_and_commands_it() {
     assert!(browser.complaints.is_empty(), "{:?}", browser.complaints);
     assert_eq!(run.end(), Some(0));
     browser.until("document.getElementById('alarm').textContent.startsWith('The run has ended')");
+}
+
+/// A program with names of all lengths, tasks that are alike, failures that were recovered from, and one that
+/// was not.
+const MISSION: &str = "
+(define-input telecommand :capacity 4)
+(defun slew (n) (fail :wheel-stuck n 'left))
+(dotimes (i 5) (with-recovery-procedures ((:wheel-stuck (abort nil))) (slew (mod i 2))))
+(dotimes (i 200) (spawn (:name 'wheel-watcher :daemon t) (sleep 3000)))
+(dotimes (i 60) (spawn (:name (intern (format nil \"SENSOR-~d\" i)) :daemon t) (wait-for-event (make-event))))
+(spawn (:name 'charging-of-batteries :daemon t) (loop (sleep 0.05)))
+(wait-for-event telecommand)
+(slew 9)";
+
+/// Returns whether the heads of columns stand above their cells, and nothing is wider than the page.
+const ALIGNED: &str = "(() => {
+  const left = node => Math.round(node.getBoundingClientRect().left), shown = node => getComputedStyle(node).display !== 'none';
+  const cells = document.querySelector('.row').children, heads = document.querySelector('.head').children;
+  const columns = narrow.matches ? [0, 1, 2, 5] : [0, 1, 2, 3, 4, 5, 6];
+  return columns.every(i => !shown(heads[i]) || left(heads[i]) === left(cells[i])) && document.documentElement.scrollWidth <= innerWidth;
+})()";
+
+#[test]
+fn the_page_is_readable_at_any_width_and_keeps_the_end_of_the_run() {
+    let folder = Folder::new("monitor_widths");
+    let Some(mut browser) = Browser::start(&folder) else {
+        return say_left_out("there is no Chromium");
+    };
+    let mut run = Operated::start(&folder, MISSION, &["--monitor"]);
+    let address = run.said("; monitor, to command: ");
+    browser.ask("Page.navigate", json!({ "url": address }));
+    browser.until("last !== null && last.rows.some(row => row.count === 200)");
+    // What was recovered from is not red, and failures that are alike have one card.
+    browser.until("last.failed === 5 && !document.getElementById('f-failed-box').classList.contains('bad')");
+    browser.until("document.querySelectorAll('#t-failures .card').length === 1");
+    browser.until("document.querySelector('.card').textContent.includes(':WHEEL-STUCK')");
+    browser.until("document.querySelector('.card').textContent.includes('5 times since')");
+    browser.until("/^[0-9]+ s more$|^[0-9]+:[0-9]+ more$/.test(document.getElementById('row-' + last.rows.find(row => row.count === 200).n).children[3].textContent)");
+    for width in [1400, 420] {
+        browser.resize(width);
+        browser.until(&format!("innerWidth === {width} && document.querySelectorAll('.row').length > 5"));
+        // There are more rows than fit, so the table has a scroll bar.
+        browser.until(
+            "document.getElementById('scroll').scrollHeight > document.getElementById('scroll').clientHeight",
+        );
+        browser.until(ALIGNED);
+        browser.until("[...document.querySelectorAll('.row > :nth-child(2)')].every(name => name.scrollWidth <= name.clientWidth)");
+    }
+    browser.resize(1400);
+    browser.value(
+        "$('signal-name').value = 'telecommand', act('signal', { input: 'telecommand', data: '1' }), true",
+    );
+    browser.until("document.body.classList.contains('ended') && $('pause').disabled");
+    browser
+        .until("$('alarm').textContent.startsWith('The run has ended with status 1: a failure or an abort')");
+    browser.until("$('alarm').textContent.includes('A failure of cause :WHEEL-STUCK with 9, LEFT.')");
+    browser.until("$('t-failures').textContent.includes('it has ended the task')");
+    assert_eq!(run.end(), Some(1));
+    // It stays so when the run cannot be reached any more.
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    browser.until(
+        "$('alarm').textContent.startsWith('The run has ended with status 1') && last.rows.length > 5",
+    );
+    assert!(browser.complaints.is_empty(), "{:?}", browser.complaints);
 }

@@ -2,6 +2,8 @@
 
 #[cfg(unix)]
 mod attach;
+#[cfg(unix)]
+mod attacks;
 mod author;
 mod background;
 mod bad_input;
@@ -53,6 +55,7 @@ mod sockets;
 #[cfg(unix)]
 mod standing;
 mod streams;
+#[cfg(unix)]
 mod terminal;
 mod testing;
 mod timeline;

@@ -22,7 +22,7 @@ use crate::exchange::{Charges, Exchange};
 use crate::heap::HeapImage;
 use crate::host::{Console, HostState};
 use crate::lookup::Lookups;
-use crate::outside::{Operations, Outside};
+use crate::outside::{ExpectedOperators, Operations, Outside};
 use crate::overhead::CollectionOverhead;
 use crate::saved_pc::SavedPc;
 use crate::schedule::Scheduler;
@@ -54,6 +54,7 @@ struct SavedOutside {
     operations: Operations,
     inputs: BTreeMap<String, Value>,
     senders: u64,
+    attendance: ExpectedOperators,
     exit_status: Option<u8>,
 }
 
@@ -109,6 +110,7 @@ impl Vm {
             operations,
             inputs,
             senders,
+            attendance,
             complaints: _,
             exit_status,
         } = outside;
@@ -139,6 +141,7 @@ impl Vm {
                 operations: operations.clone(),
                 inputs: inputs.clone(),
                 senders: *senders,
+                attendance: *attendance,
                 exit_status: *exit_status,
             },
             exchange: SavedExchange {
@@ -179,6 +182,7 @@ impl Vm {
         self.outside.operations = outside.operations.clone();
         self.outside.inputs.clone_from(&outside.inputs);
         self.outside.senders = outside.senders;
+        self.outside.attendance = outside.attendance;
         self.outside.exit_status = outside.exit_status;
         self.exchange = Exchange {
             values: exchange.values.clone(),

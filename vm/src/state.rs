@@ -167,7 +167,7 @@ state! {
     /// Visits the content of the outside.
     Outside by VisitOutside :: outside_content {
         content { exit_status, console, operations, inputs }
-        course { senders }
+        course { senders, attendance }
         transient { answer }
         process { host, inbox, functions, calls, complaints }
     }
@@ -279,6 +279,7 @@ list_state! { Journal {
     is_kept: Process,
     causes: Process,
     failed: Process,
+    ended: Process,
     noted: Process,
     recent: Process,
     recoveries: Process,

@@ -117,7 +117,8 @@ pub(crate) fn run(
     if let (Some(_), Some(reason)) = (tier, &machine.tier().1.refused) {
         eprintln!("eslvm: --tier has no effect: {reason}");
     }
-    let served = operate.begin(&mut machine)?;
+    let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+    let served = operate.begin(&mut machine, &name)?;
     let started = std::time::Instant::now();
     let is_profiled = profile.is_some() || stats == Some(Stats::Functions);
     let mut found = is_profiled.then(|| Profile::begin(&mut machine));
@@ -132,11 +133,12 @@ pub(crate) fn run(
     };
     let summary = summary.map_err(setup)?;
     let seconds = started.elapsed().as_secs_f64();
+    let mut status = command::exit_status(summary.ended);
+    served.end(&machine, summary.ended, status, summary.report.as_deref());
     drop(served);
     if let Some(found) = &mut found {
         found.end(&mut machine);
     }
-    let mut status = command::exit_status(summary.ended);
     if let Some((recorder, path)) = recording
         && let Err(error) = recorder.end(&machine, status)
     {

@@ -4,59 +4,58 @@
 //! answer with that of its request. A request says what it needs by its role; one that only looks is answered
 //! by a survey, all others come through the inbox of the machine as calls, aborts and signals.
 //!
-//! Guarantees: a connection over TCP says its secret before anything else is parsed; a packet is bounded
-//! before it is read; a session has a bounded number of requests under way, and they end with it.
+//! Guarantees: a connection over TCP says its secret before anything else is parsed, and soon, and until then it
+//! takes the place of no session; a packet is bounded before it is read, and comes in a bounded time; a session
+//! has a bounded number of requests under way, which end with it, and a bounded number of bytes on their way to
+//! its peer.
 
 pub(super) mod datum;
 mod form;
+mod outbox;
 mod packet;
 mod request;
 mod session;
 
-use std::collections::HashMap;
 use std::io;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use esl_bytecode::datum::DatumKind;
+use esl_bytecode::datum::{Datum, DatumKind};
 use esl_vm::embed::HostFunction;
+use esl_vm::host::HostOperation;
 use esl_vm::vm::Vm;
 use esl_world::{NoEventLoop, TlsIdentity};
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 pub(super) use datum::codes_of;
 pub(crate) use form::WireForm;
 pub(crate) use packet::{read, write};
 
+use super::lobby::{Lobby, notice_absence};
 use super::refusal::OperatorRefusal;
 use super::scope::RunScope;
 use super::secrets::{OperatorRole, Secrets};
+use outbox::{Outbox, Outboxes};
 use packet::LARGEST;
 use session::OperatorSession;
 
-/// Most sessions at a time.
-const SESSIONS: usize = 32;
+/// What `eslvm attach` calls itself when it greets a run, so that it is told how the run ends.
+pub(crate) const CLIENT: &str = "eslvm attach";
+
+/// Most sessions of one role at a time, so that nobody keeps out those who may do more.
+const SESSIONS: usize = 16;
 /// Most requests of a session under way.
 const UNDER_WAY: usize = 16;
 /// Most bytes of the packet with a secret.
 const SECRET: usize = 1000;
-/// Time that a peer has to say its secret, and to take a packet.
-const PATIENCE: Duration = Duration::from_secs(10);
-/// Packets on their way to a peer.
-const WAITING: usize = 256;
-
-/// Where the output of sessions goes, by their numbers.
-#[derive(Clone, Default)]
-struct SessionOutputs(Arc<Mutex<HashMap<u64, mpsc::Sender<WireForm>>>>);
-
-impl SessionOutputs {
-    fn table(&self) -> MutexGuard<'_, HashMap<u64, mpsc::Sender<WireForm>>> {
-        // The table is whole at every moment, so a panic elsewhere does not corrupt it.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
+/// Time that a peer has to say its secret, and to begin TLS before that.
+const INTRODUCTION: Duration = Duration::from_secs(5);
+/// Time that a peer has for a packet once it has begun to send it, and to take one.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Time that a peer has to take what it is told last.
+const FAREWELL: Duration = Duration::from_secs(5);
 
 /// Where operators connect.
 pub(super) enum Entrance {
@@ -71,35 +70,88 @@ pub(super) enum Entrance {
 ///
 /// # Errors
 /// The reason, if there is no event loop.
-pub(super) fn serve(machine: &mut Vm, door: Entrance, scope: RunScope) -> Result<(), NoEventLoop> {
-    let outputs = SessionOutputs::default();
-    let told = outputs.clone();
-    let tell = move |arguments: &[esl_bytecode::datum::Datum]| {
-        if let [number, said] = arguments
-            && let DatumKind::Integer(number) = number.kind()
-            && let Ok(number) = u64::try_from(number.clone())
-            && let Some(output) = told.table().get(&number)
-        {
-            let packet = match said.kind() {
-                DatumKind::String(text) => written(text),
-                _ => datum::form_of(said),
-            };
-            // Who does not read loses what is written.
-            drop(output.try_send(packet));
+pub(super) fn serve(
+    machine: &mut Vm,
+    door: Entrance,
+    scope: RunScope,
+) -> Result<SessionsHandle, NoEventLoop> {
+    let outboxes = Outboxes::default();
+    let known = outboxes.clone();
+    let tell = move |arguments: &[Datum]| {
+        if let Some((outbox, form)) = told(&known, arguments) {
+            outbox.send_at_once(&form);
         }
-        Ok(esl_bytecode::datum::Datum::nil(Default::default()))
+        Ok(Datum::nil(Default::default()))
     };
     machine.add_host_function(TELL, HostFunction::AtOnce(Box::new(tell)));
-    esl_world::spawn(accept(door, Arc::new(Attendance { scope, outputs, sessions: AtomicU64::new(0) })))
+    let known = outboxes.clone();
+    let write = move |operation: HostOperation| begin_writing(&known, operation);
+    machine.add_host_function(WRITE, HostFunction::Operation(Box::new(write)));
+    let places = OperatorRole::ALL.map(|_| Arc::new(Semaphore::new(SESSIONS)));
+    let handle = SessionsHandle(outboxes.clone());
+    let attendance = Attendance { scope, outboxes, sessions: AtomicU64::new(0), places };
+    esl_world::spawn(accept(door, Arc::new(attendance)))?;
+    Ok(handle)
 }
 
-/// Name of the function by which the library tells operators what was written.
-const TELL: &str = "%TELL-OPERATOR";
+/// The sessions of a run, for the thread that runs the machine.
+pub(super) struct SessionsHandle(Outboxes);
 
-/// Gives a machine that nobody attends the function by which the library tells operators something.
+impl SessionsHandle {
+    /// Has those who want to hear it told how the run has ended.
+    pub(super) fn end(&self, said: &str) {
+        let packet = WireForm::list([WireForm::symbol(":run-ended"), WireForm::text(said)]);
+        self.0.tell_end(&packet);
+    }
+
+    /// Returns whether all packets have been taken.
+    pub(super) fn is_told(&self) -> bool {
+        self.0.are_empty()
+    }
+}
+
+/// Name of the function by which the library tells operators something at once.
+const TELL: &str = "%TELL-OPERATOR";
+/// Name of the operation by which the library tells operators something when there is room for it.
+const WRITE: &str = "%WRITE-OPERATOR";
+
+/// Gives a machine that nobody attends the functions by which the library tells operators something.
 pub(crate) fn install_nobody(machine: &mut Vm) {
-    let ignore = |_: &[esl_bytecode::datum::Datum]| Ok(esl_bytecode::datum::Datum::nil(Default::default()));
+    let ignore = |_: &[Datum]| Ok(Datum::nil(Default::default()));
     machine.add_host_function(TELL, HostFunction::AtOnce(Box::new(ignore)));
+    let ignore = |operation: HostOperation| operation.complete(Vec::new());
+    machine.add_host_function(WRITE, HostFunction::Operation(Box::new(ignore)));
+}
+
+/// Returns what the arguments of either function say: the outbox of a session that goes on, and a packet.
+fn told(outboxes: &Outboxes, arguments: &[Datum]) -> Option<(Outbox, WireForm)> {
+    let [number, said] = arguments else { return None };
+    let DatumKind::Integer(number) = number.kind() else { return None };
+    let outbox = outboxes.of(u64::try_from(number.clone()).ok()?)?;
+    let form = match said.kind() {
+        DatumKind::String(text) => written(text),
+        _ => datum::form_of(said),
+    };
+    Some((outbox, form))
+}
+
+/// Begins to send a packet, which ends when there was room for it, or when nobody waits for that any more.
+fn begin_writing(outboxes: &Outboxes, operation: HostOperation) {
+    let Some((outbox, form)) = told(outboxes, operation.arguments()) else {
+        return operation.complete(Vec::new());
+    };
+    let (cancel, cancelled) = oneshot::channel();
+    operation.on_cancel(move || _ = cancel.send(()));
+    let send = async move {
+        tokio::select! {
+            _ = outbox.send(&form) => {}
+            // An error says that nobody can cancel it any more, since the machine has ended.
+            _ = cancelled => {}
+        }
+        operation.complete(Vec::new());
+    };
+    // Without the event loop the operation is dropped, which is how the program hears of it.
+    _ = esl_world::spawn(send);
 }
 
 /// Returns the form that tells what was written.
@@ -126,37 +178,58 @@ fn too_large(form: &WireForm) -> WireForm {
 /// What all sessions of a run share.
 struct Attendance {
     scope: RunScope,
-    outputs: SessionOutputs,
+    outboxes: Outboxes,
     /// Number of sessions so far.
     sessions: AtomicU64,
+    /// Places for sessions, by the index of the role.
+    places: [Arc<Semaphore>; OperatorRole::ALL.len()],
+}
+
+impl Attendance {
+    /// Returns a place for a session of a role, if there is one.
+    fn place(&self, role: OperatorRole) -> Option<OwnedSemaphorePermit> {
+        self.places[role as usize].clone().try_acquire_owned().ok()
+    }
 }
 
 async fn accept(door: Entrance, attendance: Arc<Attendance>) {
-    let room = Arc::new(Semaphore::new(SESSIONS));
     // They have been made for this, so the event loop takes them.
     match door {
         Entrance::Tcp(listener, secrets, identity) => {
+            let lobby = Lobby::default();
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
             loop {
-                let Ok(permit) = room.clone().acquire_owned().await else { return };
                 match listener.accept().await {
-                    Ok((stream, _)) => {
-                        let (attendance, secrets) = (attendance.clone(), Some(secrets.clone()));
-                        let identity = identity.clone();
+                    Ok((stream, address)) => {
                         drop(stream.set_nodelay(true));
+                        notice_absence(&stream);
+                        let visit = lobby.enter(address.ip());
+                        let (attendance, secrets) = (attendance.clone(), secrets.clone());
+                        let identity = identity.clone();
                         tokio::spawn(async move {
-                            if let Some(identity) = identity {
-                                // Who does not speak TLS is let go.
-                                let secured = tokio::time::timeout(PATIENCE, identity.accept(stream)).await;
-                                if let Ok(Ok(stream)) = secured {
-                                    let (reader, writer) = tokio::io::split(stream);
-                                    drop(attend(reader, writer, secrets, &attendance).await);
-                                }
-                            } else {
-                                let (reader, writer) = stream.into_split();
-                                drop(attend(reader, writer, secrets, &attendance).await);
+                            let introduce = async {
+                                let (reader, writer): (PeerReader, PeerWriter) = match identity {
+                                    None => {
+                                        let (reader, writer) = stream.into_split();
+                                        (Box::new(reader), Box::new(writer))
+                                    }
+                                    Some(identity) => {
+                                        let (reader, writer) =
+                                            tokio::io::split(identity.accept(stream).await?);
+                                        (Box::new(reader), Box::new(writer))
+                                    }
+                                };
+                                introduced(reader, writer, &secrets).await
+                            };
+                            let introduced = tokio::select! {
+                                introduced = tokio::time::timeout(INTRODUCTION, introduce) => introduced,
+                                // Others come, and it has said nothing.
+                                () = visit.ended() => return,
+                            };
+                            visit.settle();
+                            if let Ok(Ok((reader, writer, role))) = introduced {
+                                drop(attend(reader, writer, role, &attendance).await);
                             }
-                            drop(permit);
                         });
                     }
                     Err(_) => tokio::time::sleep(Duration::from_millis(100)).await,
@@ -167,14 +240,12 @@ async fn accept(door: Entrance, attendance: Arc<Attendance>) {
         Entrance::Unix(listener) => {
             let Ok(listener) = tokio::net::UnixListener::from_std(listener) else { return };
             loop {
-                let Ok(permit) = room.clone().acquire_owned().await else { return };
                 match listener.accept().await {
                     Ok((stream, _)) => {
                         let attendance = attendance.clone();
                         let (reader, writer) = stream.into_split();
                         tokio::spawn(async move {
-                            drop(attend(reader, writer, None, &attendance).await);
-                            drop(permit);
+                            drop(attend(reader, writer, OperatorRole::Patch, &attendance).await);
                         });
                     }
                     Err(_) => tokio::time::sleep(Duration::from_millis(100)).await,
@@ -184,50 +255,71 @@ async fn accept(door: Entrance, attendance: Arc<Attendance>) {
     }
 }
 
-/// Serves one connection to its end. With `secrets`, the peer says one of them first.
+/// The two directions of a connection.
+type PeerReader = Box<dyn AsyncRead + Unpin + Send>;
+type PeerWriter = Box<dyn AsyncWrite + Unpin + Send>;
+
+/// Returns a connection with the role that its peer has by the secret that it says.
+///
+/// # Errors
+/// What ends the connection.
+async fn introduced(
+    mut reader: PeerReader,
+    writer: PeerWriter,
+    secrets: &Secrets,
+) -> io::Result<(PeerReader, PeerWriter, OperatorRole)> {
+    let said = packet::read_async(&mut reader, SECRET).await?;
+    // SLIME sends it as it is, others as a string.
+    let form = WireForm::parse(&said).ok();
+    let text = form.as_ref().and_then(WireForm::as_text).unwrap_or(said.trim_end());
+    let role = secrets.role_of(text.as_bytes()).ok_or(io::ErrorKind::PermissionDenied)?;
+    Ok((reader, writer, role))
+}
+
+/// Serves one connection, whose peer has a role, to its end.
 ///
 /// # Errors
 /// What ends the connection.
 async fn attend(
     mut reader: impl AsyncRead + Unpin,
     mut writer: impl AsyncWrite + Unpin + Send + 'static,
-    secrets: Option<Secrets>,
+    role: OperatorRole,
     attendance: &Attendance,
 ) -> io::Result<()> {
-    let role = match secrets {
-        None => OperatorRole::Patch,
-        Some(secrets) => {
-            let said = tokio::time::timeout(PATIENCE, packet::read_async(&mut reader, SECRET)).await??;
-            // SLIME sends it as it is, others as a string.
-            let form = WireForm::parse(&said).ok();
-            let text = form.as_ref().and_then(WireForm::as_text).unwrap_or(said.trim_end());
-            let role = secrets.role_of(text.as_bytes());
-            let Some(role) = role else { return Err(io::ErrorKind::PermissionDenied.into()) };
-            role
-        }
+    let Some(_place) = attendance.place(role) else {
+        let reason = OperatorRefusal::TooManySessions { role, most: SESSIONS };
+        let refusal = [WireForm::symbol(":refused"), WireForm::text(reason.to_string())];
+        let packet = packet::packet(&WireForm::list(refusal)).unwrap_or_default();
+        return tokio::time::timeout(FAREWELL, async {
+            writer.write_all(&packet).await?;
+            writer.shutdown().await
+        })
+        .await?;
     };
-    let (answers, mut waiting) = mpsc::channel::<WireForm>(WAITING);
+    let (outbox, mut taken) = Outbox::new();
     let number = attendance.sessions.fetch_add(1, Ordering::Relaxed) + 1;
-    attendance.outputs.table().insert(number, answers.clone());
+    attendance.outboxes.enter(number, outbox.clone());
     let write = tokio::spawn(async move {
-        while let Some(form) = waiting.recv().await {
-            let packet = packet::packet(&form).or_else(|| packet::packet(&too_large(&form)));
-            let packet = packet.unwrap_or_default();
+        while let Some(packet) = taken.recv().await {
             // Who takes nothing is let go.
-            match tokio::time::timeout(PATIENCE, writer.write_all(&packet)).await {
+            match tokio::time::timeout(PATIENCE, writer.write_all(&packet.bytes)).await {
                 Ok(Ok(())) => {}
                 _ => break,
             }
         }
-        drop(writer.shutdown().await);
+        drop(taken);
+        drop(tokio::time::timeout(FAREWELL, writer.shutdown()).await);
     });
     let session = Arc::new(OperatorSession::new(number, role, attendance.scope.clone()));
-    let ended = take_requests(&mut reader, &session, &answers).await;
-    attendance.outputs.table().remove(&number);
+    let ended = take_requests(&mut reader, &session, &outbox).await;
+    attendance.outboxes.remove(number);
     session.end();
-    drop(answers);
+    drop(outbox);
     // What is under way ends with the session, and then there is nothing more to write.
-    drop(tokio::time::timeout(PATIENCE, write).await);
+    let stop = write.abort_handle();
+    if tokio::time::timeout(FAREWELL, write).await.is_err() {
+        stop.abort();
+    }
     ended
 }
 
@@ -263,20 +355,20 @@ pub(super) fn understand(secrets: &Secrets, bytes: &[u8]) -> usize {
 async fn take_requests(
     reader: &mut (impl AsyncRead + Unpin),
     session: &Arc<OperatorSession>,
-    answers: &mpsc::Sender<WireForm>,
+    outbox: &Outbox,
 ) -> io::Result<()> {
     let room = Arc::new(Semaphore::new(UNDER_WAY));
     loop {
         let text = tokio::select! {
-            text = packet::read_async(reader, LARGEST) => text?,
+            text = packet::read_in_time(reader, LARGEST, PATIENCE) => text?,
             // Nobody takes the answers any more.
-            () = answers.closed() => return Ok(()),
+            () = outbox.closed() => return Ok(()),
         };
         let request = match WireForm::parse(&text) {
             Ok(request) => request,
             Err(reason) => {
                 let reason = WireForm::list([WireForm::symbol(":invalid"), WireForm::text(reason)]);
-                _ = answers.send(reason).await;
+                _ = outbox.send(&reason).await;
                 continue;
             }
         };
@@ -284,15 +376,19 @@ async fn take_requests(
         match items.first().and_then(WireForm::name).as_deref() {
             Some(":emacs-rex") if items.len() >= 5 => {
                 let [form, package, thread, number] = [1, 2, 3, 4].map(|index| items[index].clone());
+                if form.items().is_some_and(|items| items.last().and_then(WireForm::as_text) == Some(CLIENT))
+                {
+                    outbox.note_hears_end();
+                }
                 let Ok(permit) = room.clone().try_acquire_owned() else {
                     let refusal = answer(Err(OperatorRefusal::TooManyRequests), number);
-                    _ = answers.send(refusal).await;
+                    _ = outbox.send(&refusal).await;
                     continue;
                 };
-                let (session, answers) = (session.clone(), answers.clone());
+                let (session, outbox) = (session.clone(), outbox.clone());
                 tokio::spawn(async move {
                     let result = session.perform(&form, &package, &thread).await;
-                    _ = answers.send(answer(result, number)).await;
+                    _ = outbox.send(&answer(result, number)).await;
                     drop(permit);
                 });
             }
@@ -306,14 +402,13 @@ async fn take_requests(
             Some(":emacs-pong" | ":emacs-channel-send") => {}
             Some(":ping") => {
                 let pong = items.iter().skip(1).cloned();
-                _ = answers
-                    .send(WireForm::list([WireForm::symbol(":emacs-pong")].into_iter().chain(pong)))
-                    .await;
+                let pong = WireForm::list([WireForm::symbol(":emacs-pong")].into_iter().chain(pong));
+                _ = outbox.send(&pong).await;
             }
             _ => {
                 let reason =
                     WireForm::list([WireForm::symbol(":invalid"), WireForm::text("it is no request")]);
-                _ = answers.send(reason).await;
+                _ = outbox.send(&reason).await;
             }
         }
     }

@@ -4,6 +4,7 @@
 
 use std::io::{self, Error, ErrorKind, Read, Write};
 use std::task::{Context, Poll, Waker};
+use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncReadExt};
 
@@ -23,8 +24,26 @@ fn length(head: [u8; 6]) -> io::Result<usize> {
 /// # Errors
 /// If the connection ends, or it is not a packet of at most `most` bytes of text.
 pub(super) async fn read_async(from: &mut (impl AsyncRead + Unpin), most: usize) -> io::Result<String> {
-    let mut head = [0; 6];
-    from.read_exact(&mut head).await?;
+    let first = from.read_u8().await?;
+    read_rest(first, from, most).await
+}
+
+/// As [`read_async`]; once the packet has begun, it comes within `time`.
+///
+/// # Errors
+/// As [`read_async`], or that it does not.
+pub(super) async fn read_in_time(
+    from: &mut (impl AsyncRead + Unpin),
+    most: usize,
+    time: Duration,
+) -> io::Result<String> {
+    let first = from.read_u8().await?;
+    tokio::time::timeout(time, read_rest(first, from, most)).await?
+}
+
+async fn read_rest(first: u8, from: &mut (impl AsyncRead + Unpin), most: usize) -> io::Result<String> {
+    let mut head = [first, 0, 0, 0, 0, 0];
+    from.read_exact(&mut head[1..]).await?;
     let length = length(head)?;
     if length > most {
         return Err(ErrorKind::InvalidData.into());
@@ -93,6 +112,20 @@ mod tests {
         for wrong in ["", "00000", "00000g(a)", "-00001a", "ffffff", "000002a", "000001("] {
             assert!(read(&mut wrong.as_bytes()).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_packet_that_has_begun_comes_in_time() {
+        use tokio::io::AsyncWriteExt;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build();
+        runtime.expect("there can be one").block_on(async {
+            let (mut near, mut far) = tokio::io::duplex(64);
+            near.write_all(b"000003(a)0000").await.expect("there is room");
+            let time = Duration::from_millis(20);
+            assert_eq!(read_in_time(&mut far, 100, time).await.ok().as_deref(), Some("(a)"));
+            let late = read_in_time(&mut far, 100, time).await;
+            assert_eq!(late.map_err(|error| error.kind()), Err(ErrorKind::TimedOut));
+        });
     }
 
     /// What is read is a form that can be written and read again; all else is refused.

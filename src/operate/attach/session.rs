@@ -9,6 +9,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_vm::host::{
     Answer, FrameVariable, FunctionRef, Incoming, Question, Right, Sender, SurveyRequest, SurveyedTask,
+    TaskStanding,
 };
 
 use super::datum::{boolean, codes_of, form_of, integer, list, string};
@@ -21,6 +22,10 @@ use crate::operate::slime::{self, SlimeCall, SlimeStep};
 
 /// Ticks that an evaluation may use.
 const TICKS: i64 = 100_000_000;
+/// Tasks that an evaluation may have made and not seen to their ends at a time.
+const MADE: i64 = 1000;
+/// Part of the memory of the run that an evaluation may allocate: one of so many.
+const PARTS: usize = 2;
 /// Tasks that a tree shows.
 const TASKS: usize = 1000;
 
@@ -116,24 +121,54 @@ impl OperatorSession {
             SessionRequest::Failures => self.failures().await,
             SessionRequest::Abort => {
                 let number = number()?;
-                self.task(number).await?;
+                let (task, _) = self.task(number).await?;
                 self.sender()?.inbox().put(Incoming::Abort(number));
-                Ok(WireForm::symbol("t"))
+                let when = if self.is_paused().await? { "when the run goes on" } else { "now" };
+                Ok(WireForm::Text(format!("; {}, number {number}, is aborted {when}\n", task.name)))
             }
             SessionRequest::Suspend | SessionRequest::Resume => {
                 let suspends = request == SessionRequest::Suspend;
                 let number = number()?;
-                self.task(number).await?;
+                let (task, _) = self.task(number).await?;
+                let is_suspended = task.standing == TaskStanding::Suspended;
+                let name = task.name;
+                if !suspends && !is_suspended {
+                    return Ok(WireForm::Text(format!("; {name}, number {number}, is not suspended\n")));
+                }
                 let arguments = vec![integer(number as i64), boolean(suspends)];
-                self.call("%SESSION-SUSPEND", arguments).await
+                let answer = self.call("%SESSION-SUSPEND", arguments).await?;
+                if answer.name().as_deref() != Some("t") {
+                    return Ok(answer);
+                }
+                let what = match (suspends, is_suspended) {
+                    (true, false) => "is suspended, with the tasks that it has made",
+                    (true, true) => "is suspended once more: resume it as often",
+                    (false, _) => "is resumed, with the tasks that it has made",
+                };
+                Ok(WireForm::Text(format!("; {name}, number {number}, {what}\n")))
             }
             SessionRequest::Pause | SessionRequest::Continue => {
-                self.sender()?.inbox().put(Incoming::Pause(request == SessionRequest::Pause));
-                Ok(WireForm::symbol("t"))
+                let pauses = request == SessionRequest::Pause;
+                let was_paused = self.is_paused().await?;
+                self.sender()?.inbox().put(Incoming::Pause(pauses));
+                Ok(WireForm::text(match (pauses, was_paused) {
+                    (true, false) => {
+                        "; all tasks stand still; the clock runs on, and `:continue` ends the pause\n"
+                    }
+                    (true, true) => "; the run is paused already\n",
+                    (false, true) => "; the tasks go on\n",
+                    (false, false) => "; the run is not paused\n",
+                }))
             }
             SessionRequest::Signal => {
                 let data = codes_of(text(1)?)?;
-                self.call("%SESSION-SIGNAL", vec![string(&text(0)?.to_uppercase()), data]).await
+                let name = text(0)?.to_uppercase();
+                let answer = self.call("%SESSION-SIGNAL", vec![string(&name), data]).await?;
+                if answer.name().as_deref() != Some("t") {
+                    return Ok(answer);
+                }
+                let with = if text(1)?.is_empty() { String::new() } else { format!(" with {}", text(1)?) };
+                Ok(WireForm::Text(format!("; {name} is signalled{with}\n")))
             }
             SessionRequest::Narrow => {
                 let rights = rights_of(arguments).ok_or_else(|| lacks(NeededArgument::Pairs))?;
@@ -213,7 +248,7 @@ impl OperatorSession {
             integer(self.number as i64),
             string(package.as_text().unwrap_or_default()),
             slime::thread_of(thread),
-            integer(TICKS),
+            self.limits(),
             boolean(call.is_evaluation),
             Datum::symbol(Symbol::esl(call.function), Span::default()),
             list(arguments),
@@ -279,6 +314,10 @@ impl OperatorSession {
 
     fn sender(&self) -> Result<&Sender, OperatorRefusal> {
         self.sender.as_ref().ok_or(OperatorRefusal::LooksOnly)
+    }
+
+    async fn is_paused(&self) -> Result<bool, OperatorRefusal> {
+        Ok(self.look(SurveyRequest::default()).await?.figures.is_paused)
     }
 
     async fn look(&self, request: SurveyRequest) -> Result<esl_vm::host::Survey, OperatorRefusal> {
@@ -367,12 +406,18 @@ impl OperatorSession {
         Ok(WireForm::Text(if text.is_empty() { "Nothing has failed.\n".into() } else { text }))
     }
 
-    /// Calls a function of the library with the number of this session, these texts, and the ticks that it
+    /// Returns the limits of an evaluation: ticks, bytes and tasks.
+    fn limits(&self) -> Datum {
+        let bytes = i64::try_from(self.scope.memory() / PARTS).unwrap_or(i64::MAX);
+        list([TICKS, bytes, MADE].map(integer))
+    }
+
+    /// Calls a function of the library with the number of this session, these texts, and the limits of what it
     /// may use.
     async fn call_in(&self, function: &str, texts: &[&str]) -> Result<WireForm, OperatorRefusal> {
         let mut arguments = vec![integer(self.number as i64)];
         arguments.extend(texts.iter().map(|text| string(text)));
-        arguments.push(integer(TICKS));
+        arguments.push(self.limits());
         self.call(function, arguments).await
     }
 

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use esl_bytecode::datum::Datum;
-use esl_vm::host::{Answer, FrameVariable, FunctionRef, Incoming, Question, Sender, SurveyRequest};
+use esl_vm::host::{Answer, FrameVariable, FunctionRef, Incoming, Question, Sender, Survey, SurveyRequest};
 use esl_world::{NoEventLoop, TlsIdentity};
 use http_body_util::{BodyExt, Channel, Limited};
 use hyper::header::{CONTENT_SECURITY_POLICY, HeaderValue, REFERRER_POLICY};
@@ -25,8 +25,10 @@ use hyper::{Request, Response, StatusCode};
 use serde_json::{Value, json};
 use tokio::sync::{Notify, watch};
 
+use super::RunEnd;
 use super::attach::datum::{boolean, integer, string};
-use super::http::{self, Hangup, HttpBody, plain, with};
+use super::http::{self, HttpBody, plain, with};
+use super::lobby::{Lobby, LobbyVisit};
 use super::refusal::OperatorRefusal;
 use super::scope::RunScope;
 use super::secrets::{OperatorRole, Secrets};
@@ -39,7 +41,7 @@ const PAGE: &str = include_str!("page.html");
 const PERIOD: Duration = Duration::from_millis(250);
 /// Tasks that one look tells of, beside those that are seen.
 const PAGE_OF_TASKS: usize = 2000;
-/// Most viewers.
+/// Most viewers of one role.
 const VIEWERS: usize = 8;
 /// Time that a viewer has to take what is sent.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -58,6 +60,29 @@ struct MonitorState {
     coming: Notify,
     /// Changes with each look.
     looks: watch::Sender<u64>,
+    /// Name of the program.
+    program: String,
+    /// How the run has ended, once it has.
+    end: Mutex<Option<RunEnd>>,
+    /// The connections.
+    lobby: Lobby,
+}
+
+/// The monitor of a run, for the thread that runs the machine.
+pub(super) struct MonitorHandle(Arc<MonitorState>);
+
+impl MonitorHandle {
+    /// Has viewers told how the run has ended, and what a last survey has shown.
+    pub(super) fn end(&self, end: RunEnd, last: Survey) {
+        lock(&self.0.model).take_last(last);
+        *lock(&self.0.end) = Some(end);
+        self.0.looks.send_modify(|look| *look += 1);
+    }
+
+    /// Returns whether all viewers have been told, so that their connections have ended.
+    pub(super) fn is_told(&self) -> bool {
+        self.0.lobby.settled() == 0
+    }
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -74,7 +99,8 @@ pub(super) fn serve(
     identity: Option<TlsIdentity>,
     scope: RunScope,
     secrets: Secrets,
-) -> Result<(), NoEventLoop> {
+    program: String,
+) -> Result<MonitorHandle, NoEventLoop> {
     let is_secured = identity.is_some();
     let monitor = Arc::new(MonitorState {
         scope,
@@ -84,9 +110,15 @@ pub(super) fn serve(
         views: Mutex::default(),
         coming: Notify::new(),
         looks: watch::Sender::new(0),
+        program,
+        end: Mutex::default(),
+        lobby: Lobby::default(),
     });
     esl_world::spawn(look_on(monitor.clone()))?;
-    http::serve(listener, identity, move |request, hangup| answer(monitor.clone(), request, hangup))
+    let handle = MonitorHandle(monitor.clone());
+    let lobby = monitor.lobby.clone();
+    http::serve(listener, identity, lobby, move |request, visit| answer(monitor.clone(), request, visit))?;
+    Ok(handle)
 }
 
 /// Looks at the run again and again while there are viewers.
@@ -124,13 +156,13 @@ async fn look_on(monitor: Arc<MonitorState>) {
 async fn answer(
     monitor: Arc<MonitorState>,
     request: Request<hyper::body::Incoming>,
-    hangup: Hangup,
+    visit: LobbyVisit,
 ) -> Response<HttpBody> {
     let (head, body) = request.into_parts();
     let (role, is_view) = match admit(&monitor.secrets, monitor.scheme, &head) {
         Err((status, text)) => return plain(status, text),
         Ok(Admitted::Page) => return page(),
-        Ok(Admitted::Viewer(role, viewer)) => return events(monitor, role, &viewer, hangup),
+        Ok(Admitted::Viewer(role, viewer)) => return events(monitor, role, &viewer, &visit),
         Ok(Admitted::Post { role, is_view }) => (role, is_view),
     };
     let body = tokio::time::timeout(PATIENCE, Limited::new(body, POST).collect()).await;
@@ -188,32 +220,46 @@ fn events(
     monitor: Arc<MonitorState>,
     role: OperatorRole,
     viewer: &str,
-    hangup: Hangup,
+    visit: &LobbyVisit,
 ) -> Response<HttpBody> {
     let coming = {
         let mut views = lock(&monitor.views);
-        if views.len() >= VIEWERS && !views.contains_key(viewer) {
+        let of_role = views.iter().filter(|(name, view)| view.role == Some(role) && *name != viewer).count();
+        if of_role >= VIEWERS {
             return plain(StatusCode::SERVICE_UNAVAILABLE, "there are too many viewers\n");
         }
         // Who comes again is told all anew, and its last connection ends.
         let coming = views.get(viewer).map_or(0, |view| view.coming) + 1;
-        views.insert(viewer.into(), ViewerView { count: model::ROWS, coming, ..ViewerView::default() });
+        views.insert(
+            viewer.into(),
+            ViewerView { count: model::ROWS, coming, role: Some(role), ..ViewerView::default() },
+        );
         coming
     };
+    // Viewers are counted by themselves.
+    visit.settle();
     monitor.coming.notify_one();
     let (mut sender, body) = Channel::<Bytes, std::convert::Infallible>::new(1);
     let watching = Watching { monitor: monitor.clone(), viewer: viewer.into(), coming };
+    let visit = visit.clone();
     tokio::spawn(async move {
         let _watching = &watching;
         // Who may signal something keeps a run that waits from being over.
         let _sender = (role >= OperatorRole::Command).then(|| monitor.scope.sender());
         let mut looks = monitor.looks.subscribe();
         loop {
-            let Some(message) = message(&watching, role).await else { return };
+            let end = lock(&monitor.end).clone();
+            let Some(mut message) = message(&watching, role, end.is_none()).await else { return };
+            if let Some(end) = &end {
+                message["ended"] = json!({ "status": end.status, "said": end.said, "report": end.report });
+            }
             let event = Bytes::from(format!("data: {message}\n\n"));
             match tokio::time::timeout(PATIENCE, sender.send_data(event)).await {
                 Ok(Ok(())) => {}
-                _ => return hangup.hang_up(),
+                _ => return visit.hang_up(),
+            }
+            if end.is_some() {
+                return;
             }
             if looks.changed().await.is_err() {
                 return;
@@ -224,6 +270,8 @@ fn events(
     let headers = response.headers_mut();
     headers.insert(hyper::header::CONTENT_TYPE, HeaderValue::from_static("text/event-stream"));
     headers.insert(hyper::header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    // There is nothing else to ask for over it.
+    headers.insert(hyper::header::CONNECTION, HeaderValue::from_static("close"));
     response
 }
 
@@ -244,8 +292,9 @@ impl Drop for Watching {
     }
 }
 
-/// Returns what a viewer is told now; `None` if it has gone.
-async fn message(watching: &Watching, role: OperatorRole) -> Option<Value> {
+/// Returns what a viewer is told now, with what only the machine can say if `asks_more`; `None` if the viewer
+/// has gone.
+async fn message(watching: &Watching, role: OperatorRole, asks_more: bool) -> Option<Value> {
     let Watching { monitor, viewer, coming } = watching;
     let view = lock(&monitor.views).get(viewer).filter(|view| view.coming == *coming)?.clone();
     let request = SurveyRequest {
@@ -254,7 +303,7 @@ async fn message(watching: &Watching, role: OperatorRole) -> Option<Value> {
         facts: (!view.relation.is_empty()).then(|| (view.relation.clone(), view.facts_from)),
         ..SurveyRequest::default()
     };
-    let needs_more = view.task.is_some() || !view.relation.is_empty();
+    let needs_more = asks_more && (view.task.is_some() || !view.relation.is_empty());
     let more = if needs_more { monitor.scope.survey(request).await } else { None };
     let (mut message, latest) = {
         let model = lock(&monitor.model);
@@ -264,10 +313,11 @@ async fn message(watching: &Watching, role: OperatorRole) -> Option<Value> {
         view.failure = latest;
     }
     message["role"] = role.name().into();
+    message["program"] = monitor.program.as_str().into();
     if let Some(more) = more {
         message["task"] = match (view.task, more.tasks.first()) {
             (Some(_), Some(row)) => json!({
-                "n": row.number, "name": row.name, "waits": row.waits_for, "ticks": row.ticks, "maker": row.maker,
+                "n": row.number, "name": row.name, "waits": row.waits_for, "ticks": row.ticks, "maker": row.maker, "ends": row.ends_at.map(|time| time as f64 / 1e9),
                 "frames": more.frames.iter().map(|frame| json!([frame.function, frame.place, FrameVariable::lines(&frame.variables)])).collect::<Vec<_>>(),
             }),
             (Some(number), None) => json!({ "n": number, "ended": true }),
@@ -283,7 +333,9 @@ async fn message(watching: &Watching, role: OperatorRole) -> Option<Value> {
 fn set_view(monitor: &MonitorState, viewer: &str, wanted: ViewerView) -> Response<HttpBody> {
     match lock(&monitor.views).get_mut(viewer) {
         // Which failures it has been shown is not for it to say, nor who it is.
-        Some(view) => *view = ViewerView { failure: view.failure, coming: view.coming, ..wanted },
+        Some(view) => {
+            *view = ViewerView { failure: view.failure, coming: view.coming, role: view.role, ..wanted }
+        }
         None => return plain(StatusCode::CONFLICT, "this viewer does not watch\n"),
     }
     monitor.looks.send_modify(|look| *look += 1);

@@ -11,6 +11,8 @@ use esl_vm::host::{
 };
 use serde_json::{Value, json};
 
+use crate::operate::secrets::OperatorRole;
+
 /// Failures that are kept.
 const FAILURES: usize = 200;
 /// Most rows that a viewer is shown at a time.
@@ -19,6 +21,8 @@ pub(super) const ROWS: usize = 120;
 /// What a viewer wants to see.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ViewerView {
+    /// Whether tasks that follow each other and are alike have one row.
+    pub(super) is_grouped: bool,
     /// Text that is to be in a task's name, place, state or reason, in lower case.
     pub(super) text: String,
     /// First row, and number of rows.
@@ -33,6 +37,8 @@ pub(super) struct ViewerView {
     pub(super) failure: u64,
     /// How often a viewer of this name has come.
     pub(super) coming: u64,
+    /// Role of the viewer, once it has come.
+    pub(super) role: Option<OperatorRole>,
 }
 
 /// The model of a run.
@@ -74,12 +80,7 @@ impl RunModel {
         self.tasks.extend(survey.tasks.into_iter().map(|row| (row.number, row)));
         self.cursor = last.unwrap_or(0);
         for row in survey.failures {
-            self.failures
-                .retain(|other| (other.task, other.time, &other.cause) != (row.task, row.time, &row.cause));
-            self.failures.push_back(row);
-        }
-        while self.failures.len() > FAILURES {
-            self.failures.pop_front();
+            self.note_failure(row);
         }
         self.note_rates(&survey.figures, &survey.inputs, now);
         (self.figures, self.relations, self.locks, self.inputs) =
@@ -88,6 +89,36 @@ impl RunModel {
         // long as well, one sees what there is so far.
         if self.cursor == 0 || self.tasks.len() >= 2 * self.order.len() {
             self.arrange();
+        }
+    }
+
+    /// Takes in what is to be seen after the end of the run: all but the tasks, which stay as they were.
+    pub(super) fn take_last(&mut self, survey: Survey) {
+        for row in survey.failures {
+            self.note_failure(row);
+        }
+        let tasks = self.figures.tasks;
+        self.figures = RunFigures { tasks, ..survey.figures };
+        (self.relations, self.locks, self.inputs) = (survey.relations, survey.locks, survey.inputs);
+        self.ticks_per_second = 0.0;
+    }
+
+    /// Notes a failure, in place of what was known of it.
+    fn note_failure(&mut self, row: FailureRow) {
+        let is_same =
+            |other: &FailureRow| (other.task, other.time, &other.cause) == (row.task, row.time, &row.cause);
+        if self.failures.iter().any(|other| other.number == row.number) {
+            return;
+        }
+        // The report of a failure comes with another number, in place of the latest note of it.
+        if row.report.is_some()
+            && let Some(at) = self.failures.iter().rposition(|other| other.report.is_none() && is_same(other))
+        {
+            self.failures.remove(at);
+        }
+        self.failures.push_back(row);
+        if self.failures.len() > FAILURES {
+            self.failures.pop_front();
         }
     }
 
@@ -123,8 +154,23 @@ impl RunModel {
 
     /// Returns the numbers of the tasks that a viewer sees.
     pub(super) fn visible(&self, view: &ViewerView) -> Vec<u64> {
-        let shown = self.matching(view).skip(view.from).take(view.count.min(ROWS));
-        shown.map(|(row, _)| row.number).collect()
+        let rows = self.rows(view);
+        let shown = rows.iter().skip(view.from).take(view.count.min(ROWS));
+        shown.map(|row| row.task.number).collect()
+    }
+
+    /// Returns the rows that a viewer could be shown.
+    fn rows<'a>(&'a self, view: &'a ViewerView) -> Vec<ShownTask<'a>> {
+        let mut rows: Vec<ShownTask<'a>> = Vec::new();
+        for (task, depth) in self.matching(view) {
+            match rows.last_mut() {
+                Some(last) if view.is_grouped && last.depth == depth && are_alike(last.task, task) => {
+                    last.count += 1;
+                }
+                _ => rows.push(ShownTask { task, depth, count: 1 }),
+            }
+        }
+        rows
     }
 
     fn matching<'a>(&'a self, view: &'a ViewerView) -> impl Iterator<Item = (&'a SurveyedTask, usize)> {
@@ -146,13 +192,9 @@ impl RunModel {
     /// Returns what a viewer is told.
     pub(super) fn message(&self, view: &ViewerView) -> Value {
         let figures = &self.figures;
-        let matching: Vec<(&SurveyedTask, usize)> = self.matching(view).collect();
-        let rows: Vec<Value> = matching
-            .iter()
-            .skip(view.from)
-            .take(view.count.min(ROWS))
-            .map(|(row, depth)| self.task(row, *depth))
-            .collect();
+        let matching = self.rows(view);
+        let rows: Vec<Value> =
+            matching.iter().skip(view.from).take(view.count.min(ROWS)).map(|row| self.task(row)).collect();
         let standings: BTreeMap<&str, u64> =
             TaskStanding::ALL.into_iter().map(TaskStanding::name).zip(figures.tasks).collect();
         let failures: Vec<Value> =
@@ -161,6 +203,7 @@ impl RunModel {
             "time": figures.time as f64 / 1e9,
             "round": figures.rounds,
             "paused": figures.is_paused,
+            "virtual": figures.is_virtual,
             "standings": standings,
             "made": figures.made,
             "ticks": figures.ticks,
@@ -171,6 +214,7 @@ impl RunModel {
                 "collections": figures.collections, "longest": figures.pauses[2] as f64 / 1e6,
             },
             "failed": figures.failed,
+            "ended_by_failure": figures.ended_by_failure,
             "recoveries": figures.recoveries,
             "restarts": figures.restarts,
             "facts": figures.facts,
@@ -194,7 +238,8 @@ impl RunModel {
         })
     }
 
-    fn task(&self, row: &SurveyedTask, depth: usize) -> Value {
+    fn task(&self, row: &ShownTask<'_>) -> Value {
+        let ShownTask { task: row, depth, count } = *row;
         let holders: Vec<Value> = row
             .held_by
             .iter()
@@ -203,16 +248,34 @@ impl RunModel {
         json!({
             "n": row.number, "maker": row.maker, "name": row.name, "depth": depth.min(40),
             "state": row.standing.name(), "waits": row.waits_for, "holders": holders,
-            "place": row.place, "ticks": row.ticks, "daemon": row.is_daemon, "cleanup": row.runs_cleanup,
-            "cycle": self.cycle.contains(&row.number),
+            "place": row.place, "ends": row.ends_at.map(|time| time as f64 / 1e9), "ticks": row.ticks, "daemon": row.is_daemon, "cleanup": row.runs_cleanup,
+            "cycle": self.cycle.contains(&row.number), "count": count,
         })
     }
+}
+
+/// A row of the table: a task, and others that are like it.
+struct ShownTask<'a> {
+    task: &'a SurveyedTask,
+    /// Depth in the tree.
+    depth: usize,
+    /// Number of tasks that it stands for.
+    count: usize,
+}
+
+/// Returns whether two tasks look alike, but for their numbers, their ticks and the ends of their waits.
+fn are_alike(one: &SurveyedTask, other: &SurveyedTask) -> bool {
+    let is_unnamed = |task: &SurveyedTask| task.name.strip_prefix("task ") == Some(&task.number.to_string());
+    (one.name == other.name || is_unnamed(one) && is_unnamed(other))
+        && (one.maker, one.standing, one.is_daemon, one.runs_cleanup)
+            == (other.maker, other.standing, other.is_daemon, other.runs_cleanup)
+        && (&one.waits_for, &one.held_by, &one.place) == (&other.waits_for, &other.held_by, &other.place)
 }
 
 fn failure(row: &FailureRow) -> Value {
     json!({
         "n": row.number, "time": row.time as f64 / 1e9, "task": row.task, "name": row.name,
-        "cause": row.cause, "place": row.place, "report": row.report,
+        "cause": row.cause, "arguments": row.arguments, "place": row.place, "report": row.report,
     })
 }
 
@@ -259,6 +322,7 @@ mod tests {
             waits_for: Some("something".into()),
             held_by: held_by.to_vec(),
             place: None,
+            ends_at: None,
             ticks: 0,
             is_daemon: false,
             runs_cleanup: false,

@@ -110,6 +110,7 @@ pub(super) fn wish(role: OperatorRole, is_view: bool, body: &[u8]) -> Result<Wis
             |name: &str| value[name].as_str().unwrap_or_default().chars().take(200).collect::<String>();
         let number = |name: &str| value[name].as_u64().unwrap_or(0) as usize;
         let view = ViewerView {
+            is_grouped: value["grouped"] == true,
             text: text("text").to_lowercase(),
             from: number("from"),
             count: number("count").min(ROWS),

@@ -67,6 +67,8 @@ pub enum Incoming {
     SenderCame,
     /// One of those has gone.
     SenderLeft,
+    /// Operators may come at any time, who send messages.
+    Attended,
 }
 
 #[derive(Default)]

@@ -74,6 +74,9 @@ pub struct SurveyedTask {
     pub held_by: Vec<u64>,
     /// Place in the program, `FILE:LINE:COLUMN`.
     pub place: Option<String>,
+    /// Time of the machine at which the wait ends at the latest, in nanoseconds, if it is a wait for a time or
+    /// has a timeout.
+    pub ends_at: Option<u64>,
     /// Ticks that it has used.
     pub ticks: u64,
     /// Whether the run may end without it.
@@ -161,6 +164,8 @@ pub struct FailureRow {
     pub name: String,
     /// Its cause.
     pub cause: String,
+    /// Its arguments, in a short text; of a condition, the values of its slots.
+    pub arguments: String,
     /// Place in the program.
     pub place: Option<String>,
     /// The report, if it has ended the task.
@@ -197,6 +202,8 @@ pub struct RunFigures {
     pub idled: u64,
     /// Whether the run is paused from outside.
     pub is_paused: bool,
+    /// Whether time is virtual, so that it stands still while tasks work.
+    pub is_virtual: bool,
     /// Number of facts.
     pub facts: u64,
     /// Bytes of objects that the last collection has left.
@@ -216,6 +223,8 @@ pub struct RunFigures {
     pub failures: Vec<(String, u64)>,
     /// Number of failures, as far as a journal is kept.
     pub failed: u64,
+    /// Number of those that have ended a task.
+    pub ended_by_failure: u64,
     /// Recovery procedures that have begun, as far as a journal is kept.
     pub recoveries: u64,
     /// Children that supervisors have restarted.

@@ -23,6 +23,8 @@ pub(crate) struct Journal {
     pub(crate) causes: BTreeMap<String, u64>,
     /// Number of failures.
     pub(crate) failed: u64,
+    /// Number of those that have ended a task.
+    pub(crate) ended: u64,
     /// Number of the latest note.
     pub(crate) noted: u64,
     /// The latest failures, oldest first.
@@ -49,6 +51,7 @@ impl Journal {
 
     /// Notes the report of the failure that has ended a task: the last one of that task.
     pub(crate) fn note_end(&mut self, task: u64, report: String) {
+        self.ended += 1;
         let last = self.recent.iter().rposition(|row| row.task == task);
         let Some(mut row) = last.and_then(|index| self.recent.remove(index)) else { return };
         row.report = Some(report);

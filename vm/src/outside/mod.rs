@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::hash::{BuildHasherDefault, DefaultHasher};
 
 use esl_bytecode::datum::Datum;
+use esl_heap::state::{StateSink, Stated};
 use indexmap::IndexMap;
 
 use crate::host::{Asked, Canceller, Console, Host, HostFailure, HostOperation, Inbox, Output, Right};
@@ -65,10 +66,29 @@ pub(crate) struct Outside {
     pub(crate) inputs: BTreeMap<String, Value>,
     /// Number of those outside who may signal them.
     pub(crate) senders: u64,
+    /// Whether operators may come who signal them.
+    pub(crate) attendance: ExpectedOperators,
     /// Stream that reports are written to.
     pub(crate) complaints: Output,
     /// Status that the program has asked to end with.
     pub(crate) exit_status: Option<u8>,
+}
+
+/// Operators of a run, who are not there yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ExpectedOperators {
+    /// None can come.
+    Nobody,
+    /// They may come at any time.
+    MayCome,
+    /// They may, and it was said that the run waits for them.
+    IsAwaited,
+}
+
+impl Stated for ExpectedOperators {
+    fn tell(&self, sink: &mut dyn StateSink) {
+        sink.word(*self as u64);
+    }
 }
 
 impl Outside {
@@ -84,6 +104,7 @@ impl Outside {
             operations: Operations::default(),
             inputs: BTreeMap::new(),
             senders: 0,
+            attendance: ExpectedOperators::Nobody,
             complaints: Output::Error,
             exit_status: None,
         }

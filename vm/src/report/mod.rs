@@ -14,8 +14,8 @@ mod variables;
 pub(crate) use calls::note_end_in_meter;
 pub(crate) use figures::note_end_in_figures;
 pub(crate) use label::{
-    cause_label, end_label, event_label, failure_arguments, label_of, lack_of, reason_of, report_in_short,
-    task_label,
+    arguments_label, cause_label, end_label, event_label, failure_arguments, label_of, lack_of, reason_of,
+    report_in_short, task_label,
 };
 pub(crate) use observe::{
     note_end_by_failure, show, tell_of_change, tell_of_failure, tell_of_signal, tell_of_waking,

@@ -1,6 +1,9 @@
 //! Telling observers what happens.
 
-use super::{cause_label, event_label, label_of, place_in_program, reason_of, report_in_short, task_label};
+use super::{
+    arguments_label, cause_label, event_label, label_of, place_in_program, reason_of, report_in_short,
+    task_label,
+};
 use crate::host::FailureRow;
 use crate::observe::{Coming, Observer, Seen};
 use crate::task::{TaskIndex, TaskNumber, TaskState};
@@ -89,7 +92,7 @@ pub(crate) fn tell_of_signal(vm: &mut Vm, event: Value) {
 }
 
 /// Notes in the journal that the running task fails.
-fn note_failure(vm: &mut Vm, cause: &str) {
+fn note_failure(vm: &mut Vm, cause: &str, condition: Value) {
     let task = vm.scheduler.task();
     let place = place_in_program(vm, task, vm.frames());
     let row = FailureRow {
@@ -98,6 +101,7 @@ fn note_failure(vm: &mut Vm, cause: &str) {
         task: task.number.0,
         name: label_of(vm, vm.heap.slot_or_nil(task.object, event::NAME), task.number),
         cause: cause.into(),
+        arguments: arguments_label(vm, condition),
         place: place.map(|place| format!("{}:{}:{}", place.source, place.line, place.column)),
         report: None,
     };
@@ -117,7 +121,7 @@ pub(crate) fn tell_of_failure(vm: &mut Vm, condition: Value, recovers: bool) {
     let number = vm.scheduler.task().number;
     let cause = cause_label(&vm.heap, condition);
     if vm.watch.journal.is_kept {
-        if recovers { vm.watch.journal.recoveries += 1 } else { note_failure(vm, &cause) }
+        if recovers { vm.watch.journal.recoveries += 1 } else { note_failure(vm, &cause, condition) }
     }
     show(vm, number, if recovers { Seen::Recovers(&cause) } else { Seen::Fails(&cause) });
 }

@@ -3,6 +3,7 @@
 //! A survey reads the machine and changes nothing. Its cost is bounded by what it tells of, but for one pass
 //! over the records of the tasks.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use esl_bytecode::symbol::Symbol;
@@ -16,6 +17,7 @@ use crate::host::{
     FrameRow, InputRow, LockRow, RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
 };
 use crate::interp::frames::Frames;
+use crate::schedule::Due;
 use crate::table::Table;
 use crate::task::{Task, TaskState};
 use crate::value::Value;
@@ -61,7 +63,7 @@ impl Vm {
         chosen.sort_unstable_by_key(|task| task.number);
         let mut survey = Survey {
             figures: figures(self, counts),
-            tasks: chosen.iter().map(|task| row_of(self, task, &owners)).collect(),
+            tasks: rows_of(self, &chosen, &owners),
             has_more_tasks,
             ..Survey::default()
         };
@@ -109,6 +111,23 @@ pub(super) fn maker_of(vm: &Vm, task: &Task) -> u64 {
     number_of_owner(vm, task.object)
 }
 
+/// Returns what there is to say of tasks, with the times at which their waits end.
+fn rows_of(vm: &Vm, tasks: &[&Task], owners: &BTreeMap<u64, u64>) -> Vec<SurveyedTask> {
+    let row = |task: &&Task| (task.number.0, row_of(vm, task, owners));
+    let mut rows: BTreeMap<u64, SurveyedTask> = tasks.iter().map(row).collect();
+    for &Reverse(timer) in &vm.scheduler.timers.heap {
+        if let Due::Wait(serial) = timer.due
+            && let Some(task) = vm.scheduler.tasks.at(timer.index)
+            && task.is_waiting_since(serial)
+            && let Some(row) = rows.get_mut(&task.number.0)
+        {
+            row.ends_at = Some(timer.time);
+        }
+    }
+    // The order is that of their numbers.
+    rows.into_values().collect()
+}
+
 /// Returns what there is to say of a task that does not run now.
 pub(super) fn row_of(vm: &Vm, task: &Task, owners: &BTreeMap<u64, u64>) -> SurveyedTask {
     SurveyedTask {
@@ -119,6 +138,7 @@ pub(super) fn row_of(vm: &Vm, task: &Task, owners: &BTreeMap<u64, u64>) -> Surve
         waits_for: (task.state != TaskState::Runnable).then(|| reason_of(vm, task)),
         held_by: holders_of(vm, task, owners),
         place: program_place(vm, task),
+        ends_at: None,
         ticks: task.ticks,
         is_daemon: task.flags.daemon(),
         runs_cleanup: task.runs_cleanup(),
@@ -159,6 +179,7 @@ fn figures(vm: &Vm, tasks: [u64; 4]) -> RunFigures {
         time: scheduler.clock.now,
         idled: scheduler.clock.idled,
         is_paused: scheduler.is_paused,
+        is_virtual: scheduler.clock.is_virtual,
         facts: vm.database.fact_count() as u64,
         live: heap.live,
         allocated: heap.allocated,
@@ -168,6 +189,7 @@ fn figures(vm: &Vm, tasks: [u64; 4]) -> RunFigures {
         pauses: [pauses.count, pauses.total, pauses.longest],
         failures: watch.journal.causes.iter().map(|(cause, &count)| (cause.clone(), count)).collect(),
         failed: watch.journal.failed,
+        ended_by_failure: watch.journal.ended,
         recoveries: watch.journal.recoveries,
         restarts: variable(vm, "*%RESTARTS*").as_index().unwrap_or(0) as u64,
         lateness: watch.journal.lateness,

@@ -9,6 +9,7 @@ use super::signal::signal;
 use super::spawn::{SpawnOptions, make_task};
 use super::wake::make_runnable;
 use crate::host::{Awaited, Host, Incoming, Look, ProcessSignal, Question, Wake};
+use crate::outside::ExpectedOperators;
 use crate::task::{TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -77,6 +78,7 @@ fn take_in_one(vm: &mut Vm, incoming: Incoming) -> bool {
             // Nobody is left who could end a pause.
             vm.scheduler.is_paused &= vm.outside.senders > 0;
         }
+        Incoming::Attended => vm.outside.attendance = ExpectedOperators::MayCome,
     }
     false
 }

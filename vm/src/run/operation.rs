@@ -3,6 +3,7 @@
 use super::finish::allocate_without_retry;
 use crate::datum;
 use crate::host::News;
+use crate::outside::ExpectedOperators;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, operation};
@@ -14,11 +15,37 @@ use esl_bytecode::symbol::Symbol;
 /// news of an operation whose handle somebody waits for. Of the others, such as one that an earlier program
 /// has left, no task would hear.
 pub(super) fn expects_news(vm: &Vm) -> bool {
+    vm.outside.senders > 0 || expects_operation(vm) || awaits_operator(vm)
+}
+
+fn expects_operation(vm: &Vm) -> bool {
     let is_awaited = |event| event::is_awaited(&vm.heap, event);
     let any_is_awaited = is_awaited(vm.scheduler.any_event);
-    vm.outside.senders > 0
-        || vm.outside.operations.handles().any(|handle| any_is_awaited || is_awaited(handle))
+    vm.outside.operations.handles().any(|handle| any_is_awaited || is_awaited(handle))
 }
+
+/// Returns whether a task waits for an input, and operators may come who signal it.
+fn awaits_operator(vm: &Vm) -> bool {
+    vm.outside.attendance != ExpectedOperators::Nobody
+        && vm.outside.inputs.values().any(|&input| event::is_awaited(&vm.heap, input))
+}
+
+/// Says for which inputs the run waits, the first time that nothing else can let it go on.
+#[cold]
+pub(super) fn say_what_operators_can_do(vm: &mut Vm) {
+    let is_awaited = vm.outside.senders == 0 && !expects_operation(vm) && awaits_operator(vm);
+    if !is_awaited || vm.outside.attendance == ExpectedOperators::IsAwaited {
+        return;
+    }
+    vm.outside.attendance = ExpectedOperators::IsAwaited;
+    let inputs = vm.outside.inputs.iter().filter(|(_, input)| event::is_awaited(&vm.heap, **input));
+    let names: Vec<&str> = inputs.map(|(name, _)| name.as_str()).take(SAID).collect();
+    let text = format!("; all tasks wait, and only an operator can signal {}\n", names.join(" or "));
+    vm.outside.complain(&text);
+}
+
+/// Inputs that are named when a run waits for operators.
+const SAID: usize = 5;
 
 /// Takes in what is heard of an operation: notes it in the handle, and signals that. What is heard of one
 /// that is over has no effect.

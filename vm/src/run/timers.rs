@@ -5,7 +5,7 @@
 
 use super::arrival::{serve_looks, wait_in_host, wake_readers};
 use super::limit::expire_in_time;
-use super::operation::expects_news;
+use super::operation::{expects_news, say_what_operators_can_do};
 use super::tell_how_far;
 use super::wake::{call_attention, make_runnable};
 use crate::host::{Awaited, Host, Wake};
@@ -132,6 +132,9 @@ pub(crate) fn idle(vm: &mut Vm) -> bool {
     };
     if deadline.is_none() && awaited == Awaited::default() {
         return false;
+    }
+    if awaited.news && deadline.is_none() && !awaited.input && !awaited.output {
+        say_what_operators_can_do(vm);
     }
     tell_how_far(vm);
     let host = &mut vm.outside.host;
