@@ -149,3 +149,38 @@ fn a_message_of_level_2_that_is_repeated_is_delivered_once() {
         packets[2..].iter().filter_map(|(first, rest)| Some((*first, *rest.get(1)?))).collect();
     assert_eq!(answers, [(0x50, 7), (0x50, 7), (0x50, 8), (0x50, 7), (0x70, 7), (0x50, 7)]);
 }
+
+/// A client that does not read on, since its program takes nothing, still says that it is there; and the
+/// program can publish, though what acknowledges that comes behind the messages that it has not taken.
+#[test]
+fn messages_that_nobody_takes_hold_up_neither_the_connection_nor_publishing() {
+    let Some(program) = broker_program() else {
+        crate::say_left_out("it needs `mosquitto`");
+        return;
+    };
+    let folder = Folder::new("mqtt-full");
+    let (_broker, port) = start_broker(program, &folder, "max_queued_messages 0\n");
+    let text = "(require :mqtt)
+(defvar *port* (parse-integer (first (command-line-arguments))))
+(mqtt:with-client (c \"127.0.0.1\" *port* :keep-alive 1 :will '(\"lost\" \"c\"))
+  (mqtt:with-client (d \"127.0.0.1\" *port*)
+    (let ((in (mqtt:subscribe c \"in\" :capacity 1 :when-full :wait))
+          (out (mqtt:subscribe d \"out\" :capacity 5000)) (lost (mqtt:subscribe d \"lost\")))
+      (dotimes (i 3000) (mqtt:publish d \"in\" (princ-to-string i)))
+      (mqtt:publish d \"other\" \"\" :qos 1)
+      ;; More than the broker waits for a sign of life.
+      (print (handler-case (with-timeout 4 (wait-for-event lost)) (failure (f) (failure-cause f))))
+      (print (mqtt:problem c))
+      (dotimes (i 3000)
+        (mqtt:publish c \"out\" (nth-value 1 (wait-for-event in)) :qos (mod i 3)))
+      (print (loop for i below 3000
+                   always (equal (nth-value 1 (wait-for-event out)) (princ-to-string i)))))))";
+    folder.file("main.esl", text);
+    let port = port.to_string();
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &port]);
+    let output = process::run(command.current_dir(folder.path()), "").quiet_output();
+    assert_eq!(
+        output.expect("nothing is wrong").split_whitespace().collect::<Vec<_>>(),
+        [":TIMEOUT", "NIL", "T"]
+    );
+}

@@ -1,8 +1,8 @@
 //! MQTT: clients of a broker, which connect again by themselves when the connection is lost.
 //!
 //! A client has a task on the event loop, which keeps the connection up and gathers what arrives, at most
-//! [`MOST_KEPT`] messages: then it does not read on until the program has taken some. While there is no
-//! connection, publishing and subscribing fail with the reason.
+//! [`MOST_KEPT`] messages: then it does not read on until the program has taken some, or waits for an answer
+//! (`room`). While there is no connection, publishing and subscribing fail with the reason.
 //!
 //! Guarantees: a message of level 2 that the broker repeats before it releases it is delivered once. Nothing
 //! is sent that the protocol does not allow.
@@ -26,8 +26,10 @@ use crate::data::{CallArguments, Numbered, boolean, failure, integer, nil, text,
 use crate::event_loop;
 use crate::operation::{Completion, define};
 
+mod room;
 mod text;
 
+use room::{HandingOver, await_room};
 use text::{check_filter, check_length, check_text, check_topic};
 
 /// Most messages that are kept for the program.
@@ -64,6 +66,8 @@ struct State {
     publishing: VecDeque<(u64, oneshot::Sender<()>)>,
     /// Who waits for those of messages that were sent, by the protocol's numbers.
     sent: HashMap<u16, oneshot::Sender<()>>,
+    /// Number of messages that are being handed over.
+    handing_over: usize,
     /// Why there is no connection.
     problem: Option<String>,
 }
@@ -72,7 +76,7 @@ struct ClientState {
     state: Mutex<State>,
     /// Notified when a message comes.
     came: Notify,
-    /// Notified when messages were taken.
+    /// Notified when messages were taken, and when the program asks for something.
     taken: Notify,
     /// Held by who hands over a message that is acknowledged, so that the order of the requests is known.
     turn: tokio::sync::Mutex<u64>,
@@ -249,6 +253,7 @@ async fn open(arguments: CallArguments, clients: Clients) -> Completion {
         asked: HashMap::new(),
         publishing: VecDeque::new(),
         sent: HashMap::new(),
+        handing_over: 0,
         problem: None,
     };
     let shared = Arc::new(ClientState {
@@ -299,8 +304,10 @@ async fn publish(arguments: CallArguments, clients: Clients) -> Completion {
     let level = qos(arguments.integer(3)?);
     let refused = |_| mqtt_failure("the client is closed");
     let is_kept = arguments.is_true(4);
+    let handing_over = HandingOver::begin(&client.shared);
     if level == QoS::AtMostOnce {
         client.client.publish(topic.clone(), level, is_kept, bytes).await.map_err(refused)?;
+        handing_over.goes_on();
         return Ok(Vec::new());
     }
     let acknowledged = {
@@ -346,6 +353,7 @@ async fn subscribe(arguments: CallArguments, clients: Clients) -> Completion {
         let refused = |_| mqtt_failure("too many pending requests");
         client.client.try_subscribe(filter.clone(), level).map_err(refused)?;
         state.subscribing.push_back(Some(sender));
+        client.shared.taken.notify_one();
         state.filters.insert(filter.clone(), level);
     }
     match answer.await {
@@ -373,7 +381,7 @@ impl Driver {
         let mut pause = PAUSES.0;
         loop {
             let next = async {
-                has_room(&self.shared).await;
+                await_room(&self.shared, &mut self.events).await;
                 self.events.poll().await
             };
             let event = tokio::select! {
@@ -402,6 +410,7 @@ impl Driver {
                         state.asked.clear();
                         state.publishing.clear();
                         state.sent.clear();
+                        state.handing_over = 0;
                     }
                     tokio::select! {
                         _ = self.close.wait_for(|&is_closing| is_closing) => return,
@@ -416,7 +425,8 @@ impl Driver {
     fn note(&mut self, event: Event) {
         match event {
             Event::Incoming(packet) => self.take_in(packet),
-            Event::Outgoing(Outgoing::Publish(number)) if number > 0 => {
+            Event::Outgoing(Outgoing::Publish(0)) => self.shared.state().hand_over_one(),
+            Event::Outgoing(Outgoing::Publish(number)) => {
                 let mut state = self.shared.state();
                 if !state.sent.contains_key(&number)
                     && let Some((_, waiting)) = state.publishing.pop_front()
@@ -483,12 +493,5 @@ impl Driver {
         };
         // A broker that does not take it is left.
         drop(tokio::time::timeout(GOODBYE, send_rest).await);
-    }
-}
-
-/// Waits until there is room for messages.
-async fn has_room(shared: &ClientState) {
-    while shared.state().messages.len() >= MOST_KEPT {
-        shared.taken.notified().await;
     }
 }
