@@ -5,16 +5,23 @@ use super::show_result;
 use crate::builtins::json;
 use crate::heap::Kind;
 use crate::number::Number;
-use crate::raise::Exit;
+use crate::raise::{Exit, Outcome};
 use crate::table::Table;
 use crate::value::Value;
 use crate::vm::Vm;
+
+/// Reads a string from its first character on, in which `false` is `NIL` and `null` is `:NULL`.
+fn read_value(vm: &mut Vm, string: Value, are_tables: bool) -> Outcome {
+    let null = vm.world.keyword(&mut vm.heap, "NULL").unwrap();
+    let are_tables = Value::boolean(are_tables);
+    json::value(vm, &[string, Value::small(0), are_tables, are_tables, Value::NIL, null])
+}
 
 /// Returns what comes of reading a text from its first character on.
 fn read(text: &str, are_tables: bool) -> String {
     let mut vm = Vm::for_tests();
     let string = vm.heap.alloc_str(text).unwrap();
-    let result = json::value(&mut vm, &[string, Value::small(0), Value::boolean(are_tables)]);
+    let result = read_value(&mut vm, string, are_tables);
     assert_eq!(result, Err(Exit::Values), "{text}");
     let values = vm.exchange.values.clone();
     show_result(&mut vm, &Ok(values.to_vec()))
@@ -26,6 +33,7 @@ fn values_are_read() {
         (" 12,", "12 ; 3 ; NIL"),
         ("-0.5e1", "-5.0 ; 6 ; NIL"),
         ("123456789012345678901234567890", "123456789012345678901234567890 ; 30 ; NIL"),
+        ("[-0, 0]", "#(-0.0 0) ; 7 ; NIL"),
         ("[true, false,null]", "#(T NIL NULL) ; 18 ; NIL"),
         ("{}", "NIL ; 2 ; NIL"),
         ("[]x", "#() ; 2 ; NIL"),
@@ -102,7 +110,7 @@ fn as_json(vm: &mut Vm, v: Value) -> Json {
 fn value_of(text: &str) -> Option<(Json, usize)> {
     let mut vm = Vm::for_tests();
     let string = vm.heap.alloc_str(text).unwrap();
-    json::value(&mut vm, &[string, Value::small(0), Value::T]).expect_err("there are three values");
+    read_value(&mut vm, string, true).expect_err("there are three values");
     let values = vm.exchange.values.clone();
     let end = values[1].as_index().expect("it is an index");
     values[2].is_nil().then(|| (as_json(&mut vm, values[0]), end))
