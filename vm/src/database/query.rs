@@ -46,8 +46,9 @@ pub(super) struct Answers {
     pub(super) width: usize,
     /// Values of the variables.
     pub(super) tuples: Tuples,
-    /// Computations that continue with each answer.
-    pub(super) consumers: Vec<u32>,
+    /// Computations that continue with each answer and have had all that were found so far. The others are in
+    /// the agenda, or at work.
+    pub(super) idle: Vec<u32>,
 }
 
 /// A computation that continues with each answer of a table, including those yet to be found.
@@ -56,8 +57,6 @@ pub(super) struct Consumer {
     pub(super) table: u32,
     /// Index of the next answer.
     pub(super) at: usize,
-    /// Whether it has had all answers found so far.
-    pub(super) is_idle: bool,
     /// Its variables for those of the table.
     pub(super) variables: SmallVec<[u32; 4]>,
     pub(super) continuation: Continuation,

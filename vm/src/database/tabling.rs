@@ -111,7 +111,7 @@ impl Query {
         by_call.add(table, hash);
         let stratum = self.rules.predicates[predicate].stratum;
         let tuples = Tuples::new(width);
-        self.tables.push(Answers { predicate, call, stratum, width, tuples, consumers: Vec::new() });
+        self.tables.push(Answers { predicate, call, stratum, width, tuples, idle: Vec::new() });
         self.set_aside(AgendaItem::Expand { table, rule: 0 }, stratum);
         table
     }
@@ -139,10 +139,11 @@ impl Query {
         let continuation = self.continuation(next);
         self.undo(before);
         let consumer = self.consumers.len() as u32;
-        let is_idle = self.tables[table as usize].tuples.len() == 0;
-        self.consumers.push(Consumer { table, at: 0, is_idle, variables, continuation, rank });
-        self.tables[table as usize].consumers.push(consumer);
-        if !is_idle {
+        self.consumers.push(Consumer { table, at: 0, variables, continuation, rank });
+        let answers = &mut self.tables[table as usize];
+        if answers.tuples.len() == 0 {
+            answers.idle.push(consumer);
+        } else {
             self.set_aside(AgendaItem::Feed(consumer), self.stratum);
         }
     }
@@ -157,17 +158,16 @@ impl Query {
         for variable in bound.drain(*trail..) {
             bindings[variable as usize] = Term::UNBOUND;
         }
-        let answers = &tables[*table as usize].tuples;
-        if *at >= answers.len() {
+        let Answers { tuples, idle, .. } = &mut tables[*table as usize];
+        if *at >= tuples.len() {
             if let Some(consumer) = *consumer {
-                let consumer = &mut consumers[consumer as usize];
-                consumer.at = *at;
-                consumer.is_idle = true;
+                consumers[consumer as usize].at = *at;
+                idle.push(consumer);
             }
             choices.pop();
             return;
         }
-        let answer = answers.get(*at);
+        let answer = tuples.get(*at);
         // An answer has a value for each of the variables.
         for (position, &variable) in variables.iter().enumerate() {
             bindings[variable as usize] = answer[position];
@@ -333,15 +333,16 @@ impl Query {
         Ok(())
     }
 
+    /// Has those go on that wait for answers of a table. Each of them takes work before it waits again, so their
+    /// number needs no account.
     fn wake_consumers(&mut self, table: u32) {
-        for at in 0..self.tables[table as usize].consumers.len() {
-            let number = self.tables[table as usize].consumers[at];
-            let consumer = &mut self.consumers[number as usize];
-            if consumer.is_idle {
-                consumer.is_idle = false;
-                let stratum = self.stratum_of(self.consumers[number as usize].continuation.sink);
-                self.set_aside(AgendaItem::Feed(number), stratum);
-            }
+        let mut idle = std::mem::take(&mut self.tables[table as usize].idle);
+        idle.sort_unstable();
+        for number in idle.drain(..) {
+            let stratum = self.stratum_of(self.consumers[number as usize].continuation.sink);
+            self.set_aside(AgendaItem::Feed(number), stratum);
         }
+        // None has come to wait meanwhile.
+        self.tables[table as usize].idle = idle;
     }
 }
