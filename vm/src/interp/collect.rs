@@ -116,6 +116,32 @@ unsafe fn scan_pieces(heap: &mut Heap, task: &mut Task, most: usize) -> usize {
     seen
 }
 
+/// Gives back most of the stacks of a task that does not run if they are much too large for what is on them.
+fn trim(heap: &mut Heap, task: &mut Task) {
+    let top = top_of_task(task);
+    let is_trimmed = task.control.trim() | (task.stack.scan == 0 && trim_stack(task, top));
+    if is_trimmed {
+        task.recount(heap);
+    }
+}
+
+/// Gives back most of the stack of a task, of which the words below `top` are used, if it is large and has
+/// been four times as high. Returns whether it has moved.
+fn trim_stack(task: &mut Task, top: usize) -> bool {
+    let (capacity, enough) = (task.stack.capacity(), 2 * top + PIECE);
+    if capacity <= LARGE_STACK || top >= capacity / 4 {
+        return false;
+    }
+    // As much at a time as does not take long; but nothing goes on before there is room.
+    loop {
+        let before = task.stack.capacity();
+        task.stack.shrink(enough);
+        if task.stack.capacity() == before {
+            return before < capacity;
+        }
+    }
+}
+
 /// Returns whether what a task holds is too much to be scanned at once.
 fn is_large(task: &Task) -> bool {
     task.stack.capacity() + task.control.get().map_or(0, Control::parts) > LARGE_STACK
@@ -289,6 +315,9 @@ impl Vm {
             heap.collect_fully_and_tell(
                 |heap| {
                     mark_roots(heap, world, compiler, exchange, embedder, deliveries, outside);
+                    for task in tasks.iter_mut() {
+                        trim(heap, task);
+                    }
                     for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                         scan(heap, task);
                         if task.flags.lacks_room() {
@@ -307,6 +336,27 @@ impl Vm {
         }
         self.end_pause(pause);
         self.world.opaques.let_go();
+    }
+
+    /// Gives back most of the stack of the running task if it is much too large for what is on it.
+    ///
+    /// # Safety
+    /// F1: `vm.cpu` describes the running task. Its frame moves.
+    pub(super) unsafe fn trim_running_stack(&mut self) {
+        let offset = self.offset_of(self.cpu.base());
+        let task = self.scheduler.task_mut();
+        // SAFETY: by the contract the offset is that of a frame.
+        let top = unsafe { top_of(task, offset) };
+        let is_trimmed = task.control.trim() | trim_stack(task, top);
+        if is_trimmed {
+            task.recount(&mut self.heap);
+            // SAFETY: the offset was inside of the stack, and below what is left of it.
+            unsafe {
+                let base = self.scheduler.task().stack.start().add(offset);
+                self.cpu.set_base(base);
+            }
+            self.update_stack_end();
+        }
     }
 
     /// The collector's turn.

@@ -130,6 +130,8 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
     }
     vm.exchange.collected_at = Some(place);
     vm.collect_fully();
+    // SAFETY: F1 holds by the contract.
+    unsafe { vm.trim_running_stack() };
     let seen = vm.heap.stats().live + vm.heap.external() as u64;
     vm.exchange.overhead.note(now, seen / BYTES_PER_TICK);
     Signal::Reload

@@ -39,7 +39,7 @@ impl Vm {
     }
 
     /// Notes up to where the running task's stack may be used, after that has changed.
-    fn update_stack_end(&mut self) {
+    pub(super) fn update_stack_end(&mut self) {
         let stack_end = stack_end(&self.config, self.scheduler.task());
         // SAFETY: it is that of the running task's stack.
         unsafe { self.cpu.set_stack_end(stack_end) };

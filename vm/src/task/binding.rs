@@ -78,6 +78,20 @@ impl Bindings {
         self.all.reserve_exact(more);
     }
 
+    /// Gives back most of the room of more than `many` bindings if hardly any of it is used. Returns whether it
+    /// has.
+    pub(crate) fn trim(&mut self, many: usize) -> bool {
+        let is_large = self.all.capacity() > many && self.all.len() < self.all.capacity() / 4;
+        if is_large {
+            self.all.shrink_to(2 * self.all.len());
+            if let Some(table) = &mut self.table {
+                table.newest.shrink_to(2 * table.newest.len());
+                table.previous.shrink_to(2 * table.previous.len());
+            }
+        }
+        is_large
+    }
+
     /// Returns the bytes that they take.
     pub(crate) fn bytes(&self) -> usize {
         let table = self.table.as_ref().map_or(0, |table| {

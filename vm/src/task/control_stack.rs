@@ -220,7 +220,15 @@ impl Clone for Control {
 #[derive(Clone, Default)]
 pub(crate) struct LazyControl(OnceCell<Box<Control>>);
 
+/// Room for entries or bindings that is given back when it is not used.
+const MANY: usize = 1 << 14;
+
 impl LazyControl {
+    /// As [`Control::trim`].
+    pub(crate) fn trim(&mut self) -> bool {
+        self.0.get_mut().is_some_and(|control| control.trim())
+    }
+
     /// Returns the control stack, if there is one.
     #[inline(always)]
     pub(crate) fn get(&self) -> Option<&Control> {
@@ -367,6 +375,16 @@ impl Control {
             + self.entries.capacity() * size_of::<Entry>()
             + self.running.capacity() * size_of::<RunningCleanup>()
             + self.bindings.bytes()
+    }
+
+    /// Gives back most of the room of entries and bindings if it is much too large for those that there are.
+    /// Returns whether it was.
+    pub(crate) fn trim(&mut self) -> bool {
+        let has_many = self.entries.capacity() > MANY && self.entries.len() < self.entries.capacity() / 4;
+        if has_many {
+            self.entries.shrink_to(2 * self.entries.len());
+        }
+        self.bindings.trim(MANY) | has_many
     }
 
     /// Returns the number of its parts: entries, bindings and running cleanups.
