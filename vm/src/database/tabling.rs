@@ -333,8 +333,8 @@ impl Query {
         Ok(())
     }
 
-    /// Has those go on that wait for answers of a table. Each of them takes work before it waits again, so their
-    /// number needs no account.
+    /// Has those go on that wait for answers of a table. Each of them takes work before it waits again, so
+    /// their number needs no account.
     fn wake_consumers(&mut self, table: u32) {
         let mut idle = std::mem::take(&mut self.tables[table as usize].idle);
         idle.sort_unstable();

@@ -123,6 +123,9 @@ pub(crate) fn drop_frames(vm: &mut Vm) {
         unsafe { task.stack.start().copy_to_nonoverlapping(stack.start(), EXIT_BASE as usize) };
         let large = std::mem::replace(&mut task.stack, stack);
         vm.scheduler.tasks.discard(large);
+        // Its record may be kept for another task, and be counted as it is now.
+        let Vm { scheduler, heap, .. } = &mut *vm;
+        scheduler.task_mut().recount(heap);
         let stack_end = stack_end(&vm.config, vm.scheduler.task());
         // SAFETY: F1: it is that of the stack that the running task has now.
         unsafe { vm.cpu.set_stack_end(stack_end) };

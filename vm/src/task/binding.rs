@@ -78,8 +78,8 @@ impl Bindings {
         self.all.reserve_exact(more);
     }
 
-    /// Gives back most of the room of more than `many` bindings if hardly any of it is used. Returns whether it
-    /// has.
+    /// Gives back most of the room of more than `many` bindings if hardly any of it is used. Returns whether
+    /// it has.
     pub(crate) fn trim(&mut self, many: usize) -> bool {
         let is_large = self.all.capacity() > many && self.all.len() < self.all.capacity() / 4;
         if is_large {
