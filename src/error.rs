@@ -5,6 +5,7 @@ use std::fmt;
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_vm::embed::{ExportError, LibraryError};
+use esl_vm::host::FailureFrame;
 use esl_vm::load::LoadError;
 use esl_vm::run::CallError;
 
@@ -46,6 +47,9 @@ pub enum Error {
         /// Arguments of the failure: of `(fail :valve-stuck 'left)` the symbol. None if the cause is an error
         /// of the language.
         arguments: Vec<Data>,
+        /// The calls that the failure has left unfinished, innermost first. A form such as `task-net` fails
+        /// as one of its tasks has: the calls of that task come before those of the task with the form.
+        frames: Vec<FailureFrame>,
     },
     /// The evaluation was aborted: by the program, or by a [`ProcessSignal`](crate::host::ProcessSignal).
     Aborted,
@@ -126,9 +130,9 @@ impl std::error::Error for Error {
 impl From<CallError> for Error {
     fn from(error: CallError) -> Error {
         match error {
-            CallError::Failed { cause, message, report, arguments } => {
+            CallError::Failed { cause, message, report, arguments, frames } => {
                 let arguments = arguments.0.iter().map(Data::from_datum).collect();
-                Error::Failed { cause, message, report, arguments }
+                Error::Failed { cause, message, report, arguments, frames }
             }
             CallError::Aborted => Error::Aborted,
             CallError::Deadlocked => Error::Deadlocked,

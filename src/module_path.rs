@@ -14,6 +14,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "world")]
+use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::compile::Required;
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::file;
@@ -157,7 +159,8 @@ impl ModulePath {
         }
         #[cfg(feature = "world")]
         if let Some(text) = esl_world::module(name) {
-            return Ok(Required::Source { name: format!("{}.esl", name.to_lowercase()), text: text.into() });
+            let name = format!("{MODULE_SOURCES}{}.esl", name.to_lowercase());
+            return Ok(Required::Source { name, text: text.into() });
         }
         Err(ModuleError::NotFound { name: name.into(), folders: self.folders.clone() })
     }

@@ -944,6 +944,8 @@ macro_rules! for_each_builtin {
             /// the library was called, and that the recovery procedures of the entry `index` have handled: if
             /// that is inside of functions of the library, for those of the outermost.
             StandIn = failure::stand_in, internal "%STAND-IN" ("index values");
+            /// Whether the function that asks was called by one of the library.
+            IsCalledByLibrary = failure::is_called_by_library, internal "%IS-CALLED-BY-LIBRARY" ("");
             /// Unwinds to the cleanup for failures with this index, which has `failure` when it has run.
             UnwindToCleanup = failure::unwind_to_cleanup, internal "%UNWIND-TO-CLEANUP" ("index failure");
             /// What the innermost running cleanup was given by `%UNWIND-TO-CLEANUP`, or `NIL`.
@@ -955,17 +957,27 @@ macro_rules! for_each_builtin {
             /// what has happened where, and the line that says that there is no recovery. In a cleanup of a
             /// task that ends already, or that leaves an expired limit, ends the cleanup, and the report goes
             /// with that of the task.
-            EndTask = failure::end_task, internal "%END-TASK" ("condition text story ending");
+            EndTask = failure::end_task, internal "%END-TASK" ("condition text story ending history full");
             /// Ends the run with this status, from 0 to 255. The remaining tasks are aborted.
             Exit = failure::exit, internal "%EXIT" ("status");
             /// The innermost `limit` frames, each a list of the function's name, and source, line and column
             /// if known. A function that has no name is `(lambda)`, a form at top level `NIL`. With
             /// `variables` a fifth item lists the names and values of the variables that are in scope there.
+            /// A sixth item is true for functions of the library.
             Backtrace = failure::backtrace, internal "%BACKTRACE" ("limit &optional variables");
+            /// Notes the innermost `limit` frames of this task, for `%NOTED-FRAMES`.
+            NoteFrames = failure::note_frames, internal "%NOTE-FRAMES" ("limit");
+            /// The frames of a note, as `%BACKTRACE` gives them; and where the body of the task begins, a
+            /// list of source, line and column if that is known.
+            NotedFrames = failure::noted_frames, internal "%NOTED-FRAMES" ("note");
             /// Takes away, until the scope around it ends, all rights but these: a list of lists of a keyword
             /// and objects, strings; without objects for all of them. Nothing gives them back. A flag of a
             /// command gives more if `by-flag`: refusals name it.
             NarrowRights = rights::narrow_rights, internal "%NARROW-RIGHTS" ("rights &optional by-flag");
+            /// Has the procedures of the form with the control entry `index`, whose datum is `data`, run with
+            /// the rights in force where that form stands, until the mask is popped that is on top of the
+            /// control stack. Returns the function of recovery procedures.
+            LendRights = rights::lend_rights, internal "%LEND-RIGHTS" ("index data");
             /// Fails unless the program has a right, a keyword, to an object. What to use in its place: for a
             /// path the one to which its links lead.
             DemandRight = rights::demand_right, internal "%DEMAND-RIGHT" ("right object");
@@ -1491,6 +1503,8 @@ macro_rules! for_each_builtin {
             TaskTicks = task::task_ticks, internal "%TASK-TICKS" ("task");
             /// The status of a task that has ended, then its values, or the condition; `NIL` before.
             TaskEnd = task::task_end, internal "%TASK-END" ("task");
+            /// The condition with which a task has failed, and the history of the failure; `NIL` of another.
+            TaskFailure = task::task_failure, internal "%TASK-FAILURE" ("task");
             /// The first value of a task that has returned; `NIL` of another.
             TaskValue = task::task_value, internal "%TASK-VALUE" ("task");
             /// The tasks that have not ended, oldest first; with those that are not listed if `hidden`.

@@ -218,10 +218,11 @@ impl<T> Future for Reply<T> {
 /// Returns the error that an answer without a value stands for.
 fn error_of(answer: Answer) -> Error {
     match answer {
-        Answer::Failed { cause, message, report, arguments } => Error::Failed {
+        Answer::Failed { cause, message, report, arguments, frames } => Error::Failed {
             cause,
             message,
             report,
+            frames,
             arguments: arguments.iter().map(Data::from_datum).collect(),
         },
         Answer::Circular => Error::NotData(ExportError::Circular),

@@ -58,8 +58,8 @@ const COMMANDS: &[SessionCommand] = &[
     SessionCommand { names: &[":load"], arguments: "FILE", does: "evaluates the forms of a file" },
     SessionCommand {
         names: &[":bt"],
-        arguments: "",
-        does: "shows the newest failure: what it was, and the frames with their variables",
+        arguments: "[full]",
+        does: "shows the newest failure: what it was, and the frames with their variables, or all of the library",
     },
     SessionCommand {
         names: &[":tasks"],
@@ -116,7 +116,7 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
     if is_interactive {
         println!("ESL {}; :help lists the commands, TAB completes, Ctrl-D ends", env!("CARGO_PKG_VERSION"));
     }
-    let mut repl = Repl { machine, typing, interrupts, virtual_time, failure: None };
+    let mut repl = Repl { machine, typing, interrupts, virtual_time, failure: None, full: None };
     repl.call("%REPL-BEGIN", "");
     let status = repl.talk();
     program::end_rest(&mut repl.machine);
@@ -135,6 +135,8 @@ struct Repl {
     virtual_time: bool,
     /// Report of the last failure of a form, and the number that the journal had given by then.
     failure: Option<(String, u64)>,
+    /// Its report with all calls of the library, for `:bt full`.
+    full: Option<String>,
 }
 
 /// What the evaluation of a text came to.
@@ -294,6 +296,9 @@ impl Repl {
                 let bare = path.strip_prefix('"').and_then(|path| path.strip_suffix('"'));
                 self.call("%REPL-LOAD", bare.unwrap_or(path));
             }
+            ":bt" if argument.trim() == "full" && self.full.is_some() => {
+                print!("{}", self.full.as_deref().unwrap_or_default());
+            }
             ":bt" => match self.newest_failure() {
                 Some(report) => print!("{report}"),
                 None => println!("Nothing has failed."),
@@ -372,6 +377,7 @@ impl Repl {
         self.interrupts.forget();
         let result = self.machine.result(task);
         let report = self.machine.detailed_report(task);
+        let full = self.machine.full_report(task);
         self.machine.forget(task);
         self.machine.flush();
         match result {
@@ -380,6 +386,7 @@ impl Repl {
                 Some(report) => {
                     print!("{}", in_short(&report));
                     self.failure = Some((report, self.noted_failures()));
+                    self.full = full;
                 }
                 None => println!("Aborted"),
             },

@@ -10,6 +10,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
+use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::datum::Datum;
 use esl_vm::host::{FrameVariable, Output};
 use esl_vm::run::RunOutcome;
@@ -358,7 +359,8 @@ impl Debugger {
             Some(task) => {
                 let name = machine.task_name(task).unwrap_or_default();
                 let frames = machine.frames_of(task, 50);
-                let is_of_program = |source: &str| !source.starts_with("stdlib/");
+                let is_of_program =
+                    |source: &str| !source.starts_with("stdlib/") && !source.starts_with(MODULE_SOURCES);
                 let place = frames.iter().filter_map(|frame| frame.place.as_ref());
                 let mut place = place;
                 let place = place.find(|place| is_of_program(&place.source));

@@ -46,6 +46,7 @@ mod real_time;
 mod recording;
 mod renaming;
 mod replay;
+mod reports;
 mod rights;
 #[cfg(unix)]
 mod secured;

@@ -13,7 +13,7 @@ use crate::core::*;
 use crate::resolve::{children, lambda_nodes};
 
 /// Functions and operators that do not return.
-const LEAVING: &[&str] = &["FAIL", "%FAIL-FOR", "%NO-CASE", "NEXT-BINDINGS", "EXIT"];
+const LEAVING: &[&str] = &["FAIL", "%FAIL-FOR", "%FAIL-AS", "%FAIL-ALL", "%NO-CASE", "NEXT-BINDINGS", "EXIT"];
 const LEAVING_STANDARD: &[&str] = &["ERROR", "INVOKE-RESTART", "ABORT"];
 
 /// Nodes that are visited for one question at most.

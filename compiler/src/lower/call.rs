@@ -342,7 +342,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
 
 /// Whether a function always fails. Its tail calls keep the frame, so that backtraces show the caller.
 fn fails(function: &Symbol) -> bool {
-    function.is_cl("ERROR") || [Symbol::esl("FAIL"), Symbol::esl("%FAIL-FOR")].contains(function)
+    const FAILING: [&str; 4] = ["FAIL", "%FAIL-FOR", "%FAIL-AS", "%FAIL-ALL"];
+    function.is_cl("ERROR") || FAILING.iter().any(|name| Symbol::esl(name) == *function)
 }
 
 /// Whether a builtin takes `count` arguments.

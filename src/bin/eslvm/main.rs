@@ -69,13 +69,17 @@ fn main() -> ExitCode {
             coverage,
             schedule,
             record,
-            trace,
+            mut trace,
+            full,
             operate,
             file,
             arguments,
         } => {
             if schedule.is_some() {
                 options.clock = ClockChoice::Virtual;
+            }
+            if full {
+                trace.push("full".into());
             }
             let path = ModulePath::new([file.as_path()], &modules.library);
             let rights = options.rights.rights();

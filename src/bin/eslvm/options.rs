@@ -89,6 +89,9 @@ pub(crate) enum EslvmAction {
         /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
         #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
         trace: Vec<String>,
+        /// Show all calls of the library in reports of failures, which are folded otherwise
+        #[arg(long)]
+        full: bool,
         #[command(flatten)]
         operate: OperateOptions,
         /// Source or bytecode file; `-` is a source from standard input

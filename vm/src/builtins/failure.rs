@@ -1,11 +1,13 @@
 //! What the library needs to signal a failure: the handlers on the control stack, the end of a task,
 //! backtraces.
 
+use esl_bytecode::compile::SourcePlace;
 use smallvec::SmallVec;
 
+use crate::heap::AllocError;
 use crate::interp::frames::Frame;
 use crate::raise::{Exit, Outcome, Raised};
-use crate::report;
+use crate::report::{self, NotedFrame};
 use crate::run;
 use crate::task::FailureReport;
 use crate::task::{EntryKind, TaskEnd, UnwindTarget, Unwinding};
@@ -43,6 +45,12 @@ pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [index, table, failure] = exactly(arguments);
+    let entry = index.as_index().and_then(|index| vm.scheduler.task().control.entries.get(index));
+    if entry.is_none_or(|entry| entry.kind != EntryKind::Recovery || entry.data != table) {
+        return vm
+            .exchange
+            .raise(Raised::Control("the recovery procedures of a failure are no longer there".into()));
+    }
     let items = vm.heap.vector(table).unwrap_or_default();
     let state = if items.first().is_some_and(|first| first.is_true()) {
         table
@@ -98,6 +106,11 @@ pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Err(Exit::Unwind)
 }
 
+pub(super) fn is_called_by_library(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    let caller = vm.frames().nth(1);
+    Ok(Value::boolean(caller.is_some_and(|frame| frame.is_of_library())))
+}
+
 pub(super) fn unwind_to_cleanup(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [index, failure] = exactly(arguments);
     let Some(index) = index.as_index() else { return vm.exchange.type_error(index, "UNSIGNED-BYTE") };
@@ -147,30 +160,39 @@ fn belongs_to_form(vm: &Vm) -> bool {
 }
 
 pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let text = |vm: &Vm, index: usize| vm.heap.string_text(arguments[index]).unwrap_or_default();
+    let [condition, words, story, ending, history, full] = exactly(arguments);
+    let text = |vm: &Vm, text: Value| vm.heap.string_text(text).unwrap_or_default();
     match vm.scheduler.task().control.final_unwinding() {
         Some(UnwindTarget::Root(TaskEnd::Failed(_))) => {
-            let story = text(vm, 2);
+            let story = text(vm, story);
             if let Some(report) = &mut vm.scheduler.task_mut().extra_mut().report {
                 report.add_cleanup(&story);
             }
         }
         Some(_) => {
             let label = report::task_label(vm, vm.scheduler.task().object);
-            vm.outside.complain(&format!("In a cleanup of {label}:\n{}{}", text(vm, 2), text(vm, 3)));
+            vm.outside.complain(&format!(
+                "In a cleanup of {label}:\n{}{}",
+                text(vm, story),
+                text(vm, ending)
+            ));
         }
-        None if belongs_to_form(vm) => {}
+        // The form is given the history at the end of the task.
+        None if belongs_to_form(vm) => vm.scheduler.task_mut().extra_mut().values = vec![history],
         None => {
-            let (story, ending) = (text(vm, 2), text(vm, 3));
-            vm.embedder.last_words = vm.heap.string_text(arguments[1]);
+            let (story, ending) = (text(vm, story), text(vm, ending));
+            vm.embedder.last_words = vm.heap.string_text(words);
             vm.embedder.last_place = report::place_in_program(vm, vm.scheduler.task(), vm.frames());
             let is_wanted = vm.watch.tells_variables;
             let detailed =
                 is_wanted.then(|| (report::with_variables(vm, &story, vm.frames()).into(), story.len()));
-            vm.scheduler.task_mut().extra_mut().report = Some(FailureReport { story, ending, detailed });
+            let full = vm.heap.string_text(full).map(Into::into);
+            let frames = vm.frames_of_history(history, vm.scheduler.task().object).into();
+            let report = FailureReport { story, full, ending, detailed, frames };
+            vm.scheduler.task_mut().extra_mut().report = Some(report);
         }
     }
-    vm.scheduler.task_mut().begin_end(TaskEnd::Failed(arguments[0]));
+    vm.scheduler.task_mut().begin_end(TaskEnd::Failed(condition));
     Err(Exit::Unwind)
 }
 
@@ -187,38 +209,60 @@ pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let limit = arguments[0].as_index().unwrap_or(usize::MAX).min(super::LIMIT);
     let with_variables = arguments.get(1).is_some_and(|variables| variables.is_true());
     let mut rows = Vec::new();
-    let row = |frame: Frame<'_>| {
-        let variables = if with_variables { report::variables_of(vm, &frame) } else { Vec::new() };
-        (frame.function, frame.place(), variables)
+    let variables = |frame: Frame<'_>| {
+        if with_variables { report::variables_of(vm, &frame) } else { Vec::new() }
     };
-    let frames: Vec<_> = vm.frames().take(limit).map(row).collect();
-    let shown: usize = frames.iter().map(|(_, _, variables)| variables.len()).sum();
-    for (function, word, variables) in frames {
-        let Some(code) = vm.heap.function_code(function) else { continue };
-        let name = vm.heap.code(code).map_or(Value::NIL, |code| code.name);
-        let is_top_level =
-            vm.heap.header(function).is_some_and(|header| header.aux == crate::world::load::TOP_LEVEL);
-        let name =
-            if name.is_nil() && !is_top_level { vm.heap.list(&[vm.world.known.lambda])? } else { name };
-        let mut row = match vm.world.source_place(&vm.heap, code, word) {
-            Some(place) => {
-                let source = vm.heap.alloc_str(&place.source)?;
-                let (line, column) = (Value::index(place.line as usize), Value::index(place.column as usize));
-                vec![name, source, line, column]
-            }
-            None => vec![name],
-        };
-        if with_variables {
-            row.resize(4, Value::NIL);
-            let mut pairs = Vec::with_capacity(variables.len());
-            for (name, value) in variables {
-                let name = vm.heap.alloc_str(&name)?;
-                pairs.push(vm.heap.cons(name, value)?);
-            }
-            row.push(vm.heap.list(&pairs)?);
+    let variables: Vec<_> = vm.frames().take(limit).map(variables).collect();
+    let shown: usize = variables.iter().map(Vec::len).sum();
+    let note = vm.note_frames(limit)?;
+    for (frame, variables) in vm.noted_frames(note).into_iter().zip(variables) {
+        let mut pairs = Vec::with_capacity(variables.len());
+        for (name, value) in variables {
+            let name = vm.heap.alloc_str(&name)?;
+            pairs.push(vm.heap.cons(name, value)?);
         }
-        rows.push(vm.heap.list(&row)?);
+        let variables = vm.heap.list(&pairs)?;
+        rows.push(row_of(vm, &frame, variables)?);
     }
     vm.exchange.charge((rows.len() + shown) * 64);
     Ok(vm.heap.list(&rows)?)
+}
+
+/// Returns a frame as a record of the library: see `reports.esl`.
+fn row_of(vm: &mut Vm, frame: &NotedFrame, variables: Value) -> Result<Value, AllocError> {
+    let has_no_name = frame.name.is_nil() && !frame.is_top_level;
+    let name = if has_no_name { vm.heap.list(&[vm.world.known.lambda])? } else { frame.name };
+    let [source, line, column] = place_parts(vm, frame.place.as_ref())?;
+    vm.heap.list(&[name, source, line, column, variables, Value::boolean(frame.is_of_library)])
+}
+
+/// Returns source, line and column of a place, `NIL` if it is unknown.
+fn place_parts(vm: &mut Vm, place: Option<&SourcePlace>) -> Result<[Value; 3], AllocError> {
+    let Some(place) = place else { return Ok([Value::NIL; 3]) };
+    let source = vm.heap.alloc_str(&place.source)?;
+    Ok([source, Value::index(place.line as usize), Value::index(place.column as usize)])
+}
+
+pub(super) fn note_frames(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let limit = arguments[0].as_index().unwrap_or(usize::MAX).min(super::LIMIT);
+    Ok(vm.note_frames(limit)?)
+}
+
+pub(super) fn noted_frames(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [note] = exactly(arguments);
+    let frames = vm.noted_frames(note);
+    let mut rows = Vec::with_capacity(frames.len());
+    for frame in &frames {
+        rows.push(row_of(vm, frame, Value::NIL)?);
+    }
+    let rows = vm.heap.list(&rows)?;
+    let beginning = match vm.beginning(note) {
+        Some(place) => {
+            let parts = place_parts(vm, Some(&place))?;
+            vm.heap.list(&parts)?
+        }
+        None => Value::NIL,
+    };
+    vm.exchange.charge(frames.len() * 64);
+    vm.give_values(&[rows, beginning])
 }

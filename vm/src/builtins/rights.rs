@@ -64,7 +64,7 @@ fn narrowed(vm: &mut Vm) -> (Vec<Rights>, Vec<Rights>) {
 }
 
 /// Returns the list of what is narrowed in the running task.
-fn in_force(vm: &Vm) -> Value {
+pub(super) fn in_force(vm: &Vm) -> Value {
     let control = vm.scheduler.running.as_ref().and_then(|task| task.control.get());
     control.and_then(|control| control.bindings.get(vm.world.rights)).unwrap_or(Value::NIL)
 }
@@ -131,6 +131,45 @@ pub(super) fn narrow_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     vm.scheduler.task_mut().control.bindings.push(Binding { symbol, value, base });
     Ok(Value::NIL)
+}
+
+/// `(%lend-rights index data)`
+///
+/// Nothing but the library calls procedures of forms, in a mask that is its own; and it calls those that the
+/// form has.
+pub(super) fn lend_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [index, data] = exactly(arguments);
+    let symbol = vm.world.rights;
+    let known = vm.heap.vector(data).and_then(|items| items.first().copied()).unwrap_or(Value::NIL);
+    if vm.scheduler.task().control.bindings.get(symbol).is_none() {
+        // There is nothing to lend.
+        return Ok(known);
+    }
+    let index = index.as_index().unwrap_or(usize::MAX);
+    let base = vm.offset_of(vm.cpu.base()) as u32;
+    let is_of_library = vm.frames().next().is_some_and(|frame| frame.is_of_library());
+    let control = &vm.scheduler.task().control;
+    let is_in_mask =
+        control.entries.last().is_some_and(|mask| mask.kind == EntryKind::Mask && mask.base == base);
+    let entry = control.entries.get(index).copied().filter(|entry| entry.data == data);
+    let (Some(entry), true) = (entry, is_in_mask && is_of_library) else {
+        return vm.exchange.program_error("rights are lent to the procedures of a form only");
+    };
+    let (below, above) = control.bindings.all().split_at(entry.bindings as usize);
+    let is_it = |binding: &&Binding| binding.symbol == symbol;
+    let is_narrowed = above.iter().rev().any(|binding| binding.symbol == symbol);
+    let value = below.iter().rev().find(is_it).map_or(Value::NIL, |binding| binding.value);
+    vm.exchange.charge((below.len() + above.len()) / 16);
+    if !is_narrowed {
+        return Ok(known);
+    }
+    // What a program may have put into the place of the function has not got them.
+    let function = if entry.kind == EntryKind::Recovery { vm.recovery_function(index)? } else { None };
+    if vm.scheduler.task().control.bindings.is_full() {
+        vm.reserve_bindings()?;
+    }
+    vm.scheduler.task_mut().control.bindings.push(Binding { symbol, value, base });
+    Ok(function.unwrap_or(known))
 }
 
 /// `(%demand-right right object)`

@@ -2,6 +2,7 @@
 
 use crate::builtins::LIMIT;
 use crate::builtins::event::{nanoseconds, take_or_park};
+use crate::builtins::rights::in_force as rights_in_force;
 use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::report;
@@ -142,7 +143,9 @@ fn give_end(vm: &mut Vm, task: Value) -> Outcome {
     let has_one_value = vm.heap.header(task).is_some_and(|header| header.aux == 1);
     vm.exchange.values.clear();
     vm.exchange.values.push(status);
-    if status == vm.world.known.failed || has_one_value {
+    if status == vm.world.known.failed {
+        vm.exchange.values.push(event::failure(&vm.heap, result).0);
+    } else if has_one_value {
         vm.exchange.values.push(result);
     } else {
         let mut rest = result;
@@ -152,6 +155,15 @@ fn give_end(vm: &mut Vm, task: Value) -> Outcome {
         }
     }
     Err(Exit::Values)
+}
+
+pub(super) fn task_failure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = expect_task(vm, arguments[0])?;
+    if vm.heap.slot_or_nil(task, event::STATE) != vm.world.known.failed {
+        return Ok(Value::NIL);
+    }
+    let (condition, history) = event::failure(&vm.heap, vm.heap.slot_or_nil(task, event::RESULT));
+    vm.give_values(&[condition, history])
 }
 
 pub(super) fn task_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -265,7 +277,8 @@ pub(super) fn set_held(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let function = vm.callable(arguments[0])?;
     let height = vm.scheduler.task().control.get().map_or(0, |control| control.entries.len());
-    let mut slots = [Value::NIL; 4];
+    let mut slots = [Value::NIL; guard::LENGTH];
+    slots[guard::RIGHTS] = rights_in_force(vm);
     slots[guard::TASK] = vm.scheduler.task().object;
     slots[guard::FUNCTION] = function;
     slots[guard::IS_OPEN] = Value::T;
@@ -277,7 +290,8 @@ pub(super) fn interrupt_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let [task, function] = exactly(arguments);
     let task = expect_task(vm, task)?;
-    let mut slots = [Value::NIL; 4];
+    let mut slots = [Value::NIL; guard::LENGTH];
+    slots[guard::RIGHTS] = Value::UNSUPPLIED;
     slots[guard::TASK] = task;
     slots[guard::FUNCTION] = vm.callable(function)?;
     slots[guard::IS_OPEN] = Value::T;

@@ -400,7 +400,12 @@ impl Walk<'_> {
             Kind::Task => {
                 let slots = vm.heap.record(v, Kind::Task).unwrap_or_default().to_vec();
                 let is_alive = slots[event::STATE].is_fixnum();
-                for (index, v) in slots.into_iter().enumerate() {
+                let has_failed = slots[event::STATE] == vm.world.known.failed;
+                for (index, mut v) in slots.into_iter().enumerate() {
+                    if has_failed && index == event::RESULT && !self.is_strict {
+                        // Where it has failed makes no difference.
+                        v = event::failure(&vm.heap, v).0;
+                    }
                     // Where it is, and what it belongs to.
                     if self.is_strict || !(is_alive && (index == event::STATE || index == event::RESULT)) {
                         self.value(v);

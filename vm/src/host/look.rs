@@ -6,6 +6,8 @@
 
 use std::fmt;
 
+use esl_bytecode::compile::SourcePlace;
+
 use super::Inbox;
 
 /// What is to be seen of a run.
@@ -151,6 +153,19 @@ pub struct InputRow {
     pub dropped: u64,
 }
 
+/// A call that a failure has left unfinished.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FailureFrame {
+    /// What reports call the task in which it was.
+    pub task: String,
+    /// Name of its function, as the program prints it.
+    pub function: String,
+    /// Where it stood, if that is known.
+    pub place: Option<SourcePlace>,
+    /// Whether the function belongs to the library, or to a module that comes with the machine.
+    pub is_of_library: bool,
+}
+
 /// A failure that has happened.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FailureRow {
@@ -170,6 +185,9 @@ pub struct FailureRow {
     pub place: Option<String>,
     /// The report, if it has ended the task.
     pub report: Option<String>,
+    /// The calls that it has left unfinished, innermost first, if it has ended the task: those of the task,
+    /// and before them those of the tasks whose failures it has failed with.
+    pub frames: Vec<FailureFrame>,
 }
 
 /// How late timers were.

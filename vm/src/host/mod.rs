@@ -38,8 +38,8 @@ pub(crate) use console::{Console, Taken, column_after, encode};
 pub use door::{SendError, Sender};
 pub use inbox::{Inbox, Incoming};
 pub use look::{
-    FailureRow, FrameRow, FrameVariable, InputRow, Lateness, LockRow, Look, RelationRow, RunFigures, Survey,
-    SurveyRequest, SurveyedTask, TaskStanding,
+    FailureFrame, FailureRow, FrameRow, FrameVariable, InputRow, Lateness, LockRow, Look, RelationRow,
+    RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
 };
 pub(crate) use operation::Canceller;
 pub use operation::{HostFailure, HostOperation, News};

@@ -13,7 +13,7 @@ use std::task::{Context, Poll, Waker};
 
 use esl_bytecode::datum::Datum;
 
-use super::{Inbox, Incoming, Sender};
+use super::{FailureFrame, Inbox, Incoming, Sender};
 
 /// A function of the program, as the outside knows it.
 #[derive(Clone, Debug)]
@@ -108,6 +108,8 @@ pub enum Answer {
         report: String,
         /// Arguments of the failure, if its cause is one of the program's.
         arguments: Vec<Datum>,
+        /// The calls that it has left unfinished, innermost first.
+        frames: Vec<FailureFrame>,
     },
     /// The task of the call was aborted.
     Aborted,

@@ -10,6 +10,7 @@ use crate::task::Entry;
 use crate::task::Task;
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::world::load::is_of_library;
 use esl_bytecode::module::VariablePlace;
 use esl_bytecode::opcode::{CallTarget, Opcode};
 
@@ -76,10 +77,28 @@ impl<'a> Frame<'a> {
             )
     }
 
-    /// Returns whether its function is one of the library.
-    fn is_of_library(&self) -> bool {
+    /// Returns whether its function, one of the library, is a step of the function of the library below it:
+    /// that has called it by name, or it is a closure, which only the library can have called. A function
+    /// that the caller was given as a value may have taken the place of one of the program, by a tail call;
+    /// in modules, which hardly do so with each other's functions, it counts as a step.
+    fn is_step_of(&self, caller: &Frame<'_>, heap: &Heap) -> bool {
         // SAFETY: F2: the function of a frame is a Function.
-        unsafe { (*code_of(self.function)).owner.is_fixnum() }
+        let name = unsafe { (*code_of(self.function)).name };
+        let is_global = heap.symbol(name).is_some_and(|symbol| symbol.function == self.function);
+        let is_step = !is_global || self.is_of_module() && caller.is_of_module();
+        self.is_called_by_name() || is_step && !stubs::is_return_above(self.return_address())
+    }
+
+    /// Returns whether its function is one of a module that comes with the machine.
+    fn is_of_module(&self) -> bool {
+        // SAFETY: F2: the function of a frame is a Function.
+        unsafe { (*code_of(self.function)).owner == Value::T }
+    }
+
+    /// Returns whether its function is one of the library.
+    pub(crate) fn is_of_library(&self) -> bool {
+        // SAFETY: F2: the function of a frame is a Function.
+        unsafe { is_of_library(&*code_of(self.function)) }
     }
 }
 
@@ -197,9 +216,7 @@ impl Vm {
         let mut frames = self.frames();
         let mut callee = frames.next()?;
         for caller in frames {
-            // A caller that was given its callee as a value may be the program's, which has called on by a
-            // tail call.
-            if found.is_some() && !callee.is_called_by_name() {
+            if found.is_some() && !callee.is_step_of(&caller, &self.heap) {
                 break;
             }
             let offset = self.offset_of(caller.base) as u32;

@@ -5,15 +5,21 @@ use super::Signal;
 use super::call::{FramePlace, call};
 use super::substitute::resume_below;
 use crate::saved_pc::SavedPc;
-use crate::task::{Entry, EntryKind};
+use crate::task::{Binding, Entry, EntryKind};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// Calls a function where the running task stands, before the instruction there.
+/// Calls a function where the running task stands, before the instruction there. It has the rights `lent`, or
+/// those of the place without them.
 ///
 /// # Safety
 /// The contract of [`super::settle`], at an instruction that has had no effect yet.
-pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Signal {
+pub(super) unsafe fn interrupt(
+    vm: &mut Vm,
+    function: Value,
+    arguments: &[Value],
+    lent: Option<Value>,
+) -> Signal {
     let base = vm.offset_of(vm.cpu.base()) as u32;
     let task = vm.scheduler.task_mut();
     let wait = std::mem::replace(&mut task.wait, Value::NIL);
@@ -21,6 +27,9 @@ pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]
     let kind = EntryKind::Interrupt;
     let entry = Entry { data: wait, pc: SavedPc::NONE, base, bindings, window: 0, want: 0, kind };
     task.control.entries.push(entry);
+    if let Some(value) = lent {
+        task.control.bindings.push(Binding { symbol: vm.world.rights, value, base });
+    }
     // SAFETY: F1 holds by the contract, and a frame above the running one needs no window.
     unsafe { call(vm, function, arguments, FramePlace::Interrupt) }
 }
@@ -44,6 +53,7 @@ impl Vm {
         if let Some(entry) = task.control.entries.pop() {
             debug_assert_eq!(entry.kind, EntryKind::Interrupt);
             task.wait = entry.data;
+            task.control.bindings.truncate(entry.bindings as usize);
         }
     }
 }

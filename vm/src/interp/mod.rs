@@ -277,11 +277,16 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
 }
 
 /// Calls `function` where the task in `vm.scheduler.running`, which is loaded, stands.
-pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<(), Leave> {
+pub(crate) fn interrupt(
+    vm: &mut Vm,
+    function: Value,
+    arguments: &[Value],
+    lent: Option<Value>,
+) -> Result<(), Leave> {
     // SAFETY: F1: the task is loaded; a task that was switched out stands at an instruction that has had no
     // effect yet.
     unsafe {
-        let signal = interrupt::interrupt(vm, function, arguments);
+        let signal = interrupt::interrupt(vm, function, arguments, lent);
         settle(vm, signal)
     }
 }

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use crate::host::{FailureRow, Lateness};
+use crate::host::{FailureFrame, FailureRow, Lateness};
 
 /// Failures that are kept whole.
 const RECENT: usize = 200;
@@ -50,11 +50,12 @@ impl Journal {
     }
 
     /// Notes the report of the failure that has ended a task: the last one of that task.
-    pub(crate) fn note_end(&mut self, task: u64, report: String) {
+    pub(crate) fn note_end(&mut self, task: u64, report: String, frames: Vec<FailureFrame>) {
         self.ended += 1;
         let last = self.recent.iter().rposition(|row| row.task == task);
         let Some(mut row) = last.and_then(|index| self.recent.remove(index)) else { return };
         row.report = Some(report);
+        row.frames = frames;
         // It is news to those who have seen it without the report, though it is no other failure.
         self.noted += 1;
         self.recent.push_back(FailureRow { number: self.noted, ..row });

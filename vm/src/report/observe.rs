@@ -104,6 +104,7 @@ fn note_failure(vm: &mut Vm, cause: &str, condition: Value) {
         arguments: arguments_label(vm, condition),
         place: place.map(|place| format!("{}:{}:{}", place.source, place.line, place.column)),
         report: None,
+        frames: Vec::new(),
     };
     vm.watch.journal.note_failure(row);
 }
@@ -113,7 +114,8 @@ pub(crate) fn note_end_by_failure(vm: &mut Vm, condition: Value) {
     let task = vm.scheduler.task();
     let report = task.extra.as_ref().and_then(|extra| extra.report.as_ref());
     let text = report.map_or_else(|| report_in_short(&vm.heap, condition), |report| report.detailed_text());
-    vm.watch.journal.note_end(task.number.0, text);
+    let frames = report.map_or(Vec::new(), |report| report.frames.to_vec());
+    vm.watch.journal.note_end(task.number.0, text, frames);
 }
 
 /// Tells observers that the running task fails, or recovers.

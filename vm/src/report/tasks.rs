@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use esl_bytecode::compile::SourcePlace;
+use esl_bytecode::compile::{MODULE_SOURCES, SourcePlace};
 use esl_bytecode::word::Word;
 
 use super::survey::{lock_owners, maker_of, row_of};
@@ -23,9 +23,9 @@ const SHOWN_IN_TREE: usize = 1000;
 /// Maximal number of frames searched for a line of the program.
 const FRAMES: usize = 50;
 
-/// Returns whether a source belongs to the library, by the name that its build gives it.
+/// Returns whether a source belongs to the library, or to a module that comes with the machine, by its name.
 pub(super) fn is_of_library(source: &str) -> bool {
-    source.starts_with("stdlib/") && source.ends_with(".esl")
+    source.ends_with(".esl") && (source.starts_with("stdlib/") || source.starts_with(MODULE_SOURCES))
 }
 
 /// Returns the word of the one tail call in some code; `None` if there are several.

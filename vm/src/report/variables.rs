@@ -50,13 +50,15 @@ pub(crate) fn with_variables<'a>(vm: &Vm, report: &str, frames: impl Iterator<It
     let frames: Vec<Frame<'a>> = frames.take(FRAMES).collect();
     let lines: Vec<&str> = report.lines().collect();
     let mut rows: Vec<Vec<FrameVariable>> = vec![Vec::new(); lines.len()];
-    // What a cleanup was run for is told behind it: those frames are gone.
-    let is_past = |line: &&str| line.starts_with("  while cleaning up after ");
-    let end = lines.iter().position(is_past).unwrap_or(lines.len());
-    if lines[..end].iter().all(|line| *line != CUT_OFF) && frames.len() < FRAMES {
+    // What a cleanup was run for is told behind it, and so are failures of other tasks; that of a task as
+    // which this one fails before it. Those frames are gone.
+    let is_past = |line: &&str| line.starts_with("  while cleaning up after ") || line.starts_with("In ");
+    let end = lines.iter().skip(1).position(is_past).map_or(lines.len(), |at| at + 1);
+    let begin = lines[..end].iter().rposition(|line| line.starts_with("  in task ")).map_or(0, |at| at + 1);
+    if lines[begin..end].iter().all(|line| *line != CUT_OFF) && frames.len() < FRAMES {
         // What is gone is further in than what is there, so both are compared from outside.
         let mut outer = frames.len();
-        for (index, line) in lines[..end].iter().enumerate().rev() {
+        for (index, line) in lines[..end].iter().enumerate().skip(begin).rev() {
             if let Some(found) = frames[..outer].iter().rposition(|frame| is_line_of(vm, line, frame)) {
                 rows[index] = variable_rows(vm, &frames[found]);
                 outer = found;
@@ -64,7 +66,7 @@ pub(crate) fn with_variables<'a>(vm: &Vm, report: &str, frames: impl Iterator<It
         }
     } else {
         let mut inner = 0;
-        for (index, line) in lines[..end].iter().enumerate() {
+        for (index, line) in lines[..end].iter().enumerate().skip(begin) {
             if let Some(found) = frames[inner..].iter().position(|frame| is_line_of(vm, line, frame)) {
                 inner += found + 1;
                 rows[index] = variable_rows(vm, &frames[inner - 1]);

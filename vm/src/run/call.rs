@@ -6,6 +6,7 @@ use esl_bytecode::datum::Datum;
 
 use super::RunOutcome;
 use super::ending::end_task;
+use crate::host::FailureFrame;
 use crate::observe::Seen;
 use crate::report;
 use crate::task::{Task, TaskEnd, TaskId, TaskResult};
@@ -37,6 +38,8 @@ pub enum CallError {
         report: String,
         /// Arguments of the failure, if its cause is one of the program's.
         arguments: FailureArguments,
+        /// The calls that the failure has left unfinished, innermost first.
+        frames: Vec<FailureFrame>,
     },
     /// The task was aborted.
     Aborted,
@@ -130,6 +133,7 @@ impl Vm {
         let result = self.result(id);
         end_task(self, id);
         let report = self.report(id);
+        let frames = self.failure_frames(id);
         self.forget(id);
         let error = match (result, outcome) {
             (TaskResult::Succeeded(values), _) => return Ok(values),
@@ -138,7 +142,7 @@ impl Vm {
                 let message = self.embedder.last_words.take().unwrap_or_else(|| self.describe(condition));
                 let arguments = FailureArguments(report::failure_arguments(self, condition));
                 let report = report.unwrap_or_default();
-                let failed = CallError::Failed { cause, message, report, arguments };
+                let failed = CallError::Failed { cause, message, report, arguments, frames };
                 return Err((failed, condition));
             }
             (TaskResult::Aborted, _) => CallError::Aborted,
@@ -178,6 +182,17 @@ impl Vm {
     pub fn detailed_report(&self, id: TaskId) -> Option<String> {
         let extra = self.scheduler.tasks.get(id)?.extra.as_ref()?;
         extra.report.as_ref().map(|report| report.detailed_text()).or_else(|| self.report(id))
+    }
+
+    /// Returns the report of the failure that ended a task with all calls of the library, if it was kept.
+    pub fn full_report(&self, id: TaskId) -> Option<String> {
+        self.scheduler.tasks.get(id)?.extra.as_ref()?.report.as_ref()?.full_text()
+    }
+
+    /// Returns the calls that the failure has left unfinished that ended a task, innermost first.
+    pub fn failure_frames(&self, id: TaskId) -> Vec<FailureFrame> {
+        let extra = self.scheduler.tasks.get(id).and_then(|task| task.extra.as_ref());
+        extra.and_then(|extra| extra.report.as_ref()).map_or(Vec::new(), |report| report.frames.to_vec())
     }
 
     /// Returns the ticks that a task has used.

@@ -26,7 +26,7 @@ pub(super) fn finish_task(vm: &mut Vm) {
     let result = match (end, &values[..]) {
         (TaskEnd::Succeeded, &[value]) => value,
         (TaskEnd::Succeeded, values) => allocate_without_retry(vm, |vm| Ok(vm.heap.list(values)?)),
-        (TaskEnd::Failed(condition), _) => condition,
+        (TaskEnd::Failed(condition), _) => with_history(vm, condition),
         _ => Value::NIL,
     };
     let has_one_value = end == TaskEnd::Succeeded && values.len() == 1;
@@ -81,6 +81,16 @@ pub(super) fn finish_task(vm: &mut Vm) {
     end_run_if_over(vm, end);
 }
 
+/// Returns what is kept of the failure of the running task: the condition; for a form that is told of it, a
+/// cons of that and the history, which `%END-TASK` has left.
+fn with_history(vm: &mut Vm, condition: Value) -> Value {
+    let task = vm.scheduler.task_mut();
+    let left = task.extra.as_mut().filter(|_| task.notify.is_true() && !task.flags.kept());
+    let Some(history) = left.and_then(|extra| extra.values.pop()) else { return condition };
+    // The condition alone if there is no room: the form fails with that.
+    vm.heap.cons(condition, history).unwrap_or(condition)
+}
+
 /// Allocates where an instruction cannot be done again, at the end of a task or between turns: with the
 /// reserve of the heap if need be, and with a collection.
 pub(super) fn allocate_without_retry(
@@ -117,8 +127,12 @@ fn report_end(vm: &mut Vm, end: TaskEnd, is_awaited: bool) {
     let report = task.extra.as_mut().and_then(|extra| extra.report.take());
     let (name, number) = (vm.heap.slot_or_nil(task.object, event::NAME), task.number);
     let label = report::label_of(vm, name, number);
+    let began = vm.place_of_code(interp::start::first_code_of(vm.scheduler.task()));
+    let began = began.map_or(String::new(), |place| {
+        format!(", begun at {}:{}:{}", place.source, place.line, place.column)
+    });
     let text = report.map_or_else(|| report::report_in_short(&vm.heap, condition), |report| report.text());
-    vm.outside.complain(&format!("In {label}:\n{text}"));
+    vm.outside.complain(&format!("In {label}{began}:\n{text}"));
 }
 
 /// Ends the run with the running task, if it is the last that matters.

@@ -34,19 +34,24 @@ pub(crate) fn interrupt_by(vm: &mut Vm, guard: Value) {
 /// What takes the task off the processor before it runs.
 pub(super) fn deliver_pending(vm: &mut Vm) -> Result<(), Leave> {
     let was_unwinding = vm.scheduler.task().control.is_unwinding();
-    let function = take_pending(vm);
-    if function.is_some() || vm.scheduler.task().control.is_unwinding() != was_unwinding {
+    let guard = take_pending(vm);
+    if guard.is_some() || vm.scheduler.task().control.is_unwinding() != was_unwinding {
         // The task will not do what it stands before.
         vm.scheduler.points.is_open = false;
     }
-    match function {
-        Some(function) => interp::interrupt(vm, function, &[]),
+    match guard {
+        Some(guard) => {
+            let function = vm.heap.slot_or_nil(guard, guard::FUNCTION);
+            let rights = vm.heap.slot_or_nil(guard, guard::RIGHTS);
+            interp::interrupt(vm, function, &[], (rights != Value::UNSUPPLIED).then_some(rights))
+        }
         None => Ok(()),
     }
 }
 
-/// Turns what is pending for the running task into an unwinding, or returns a function to be called where the
-/// task stands. What has to wait for the end of a cleanup, or of a critical section, stays noted.
+/// Turns what is pending for the running task into an unwinding, or returns a guard whose function is to be
+/// called where the task stands. What has to wait for the end of a cleanup, or of a critical section, stays
+/// noted.
 fn take_pending(vm: &mut Vm) -> Option<Value> {
     let scheduler = &mut vm.scheduler;
     if scheduler.task().account != AccountId::NONE && scheduler.is_task_spent() {
@@ -124,7 +129,7 @@ fn unwind_to_limit(vm: &mut Vm, entry: usize, cause: Value) {
     }
 }
 
-/// Takes the function of the first guard whose interrupt may be delivered now.
+/// Takes the first guard whose interrupt may be delivered now.
 fn take_interrupt(vm: &mut Vm, cleanup: Option<usize>) -> Option<Value> {
     let task = vm.scheduler.task();
     let interrupts = task.extra.as_ref().map_or(&[][..], |extra| &extra.interrupts[..]);
@@ -141,5 +146,5 @@ fn take_interrupt(vm: &mut Vm, cleanup: Option<usize>) -> Option<Value> {
         return None;
     }
     guard::set_open(&mut vm.heap, guard, false);
-    Some(vm.heap.slot_or_nil(guard, guard::FUNCTION))
+    Some(guard)
 }

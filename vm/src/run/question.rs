@@ -49,6 +49,7 @@ fn no_call(function: &FunctionRef) -> Answer {
         message: message.into(),
         report: String::new(),
         arguments: Vec::new(),
+        frames: Vec::new(),
     }
 }
 
@@ -149,13 +150,14 @@ pub(super) fn answer_call(vm: &mut Vm, end: TaskEnd, values: &[Value]) -> bool {
             let extra = vm.scheduler.task_mut().extra.as_mut();
             let report = extra.and_then(|extra| extra.report.take());
             let message = vm.embedder.last_words.take().unwrap_or_else(|| vm.describe(condition));
+            let frames = report.as_ref().map_or(Vec::new(), |report| report.frames.to_vec());
             let report = report.map_or_else(
                 || report::report_in_short(&vm.heap, condition),
                 |report| report.detailed_text(),
             );
             let (cause, arguments) =
                 (report::cause_label(&vm.heap, condition), report::failure_arguments(vm, condition));
-            Answer::Failed { cause, message, report, arguments }
+            Answer::Failed { cause, message, report, arguments, frames }
         }
         TaskEnd::Aborted | TaskEnd::Spent => Answer::Aborted,
     };

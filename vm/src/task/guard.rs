@@ -12,6 +12,10 @@ pub(crate) const IS_OPEN: usize = 2;
 /// Slot: the height of the control stack where it was made; it acts inside a cleanup only if it was made
 /// there.
 pub(crate) const HEIGHT: usize = 3;
+/// Slot: the rights with which the function runs, as they are bound; unsupplied for those of the place.
+pub(crate) const RIGHTS: usize = 4;
+/// Number of slots.
+pub(crate) const LENGTH: usize = 5;
 /// `aux` of such a record.
 pub(crate) const AUX: u16 = 1;
 

@@ -10,6 +10,7 @@
 
 mod binding;
 mod control_stack;
+mod failure;
 pub(crate) mod guard;
 mod id;
 mod limit;
@@ -20,6 +21,7 @@ pub(crate) use binding::{Binding, Bindings};
 pub(crate) use control_stack::{
     Control, Entry, EntryKind, LazyControl, RunningCleanup, TaskEnd, UnwindTarget, Unwinding,
 };
+pub(crate) use failure::FailureReport;
 pub use id::TaskNumber;
 pub(crate) use id::{LimitNumber, Serial, TaskIndex};
 pub(crate) use limit::{AccountId, Allowance, Fund, Limit};
@@ -27,13 +29,10 @@ pub(crate) use standstill::{Rest, Standstill};
 pub use tasks::TaskId;
 pub(crate) use tasks::Tasks;
 
-use std::sync::Arc;
-
 use crate::heap::{Heap, Holder};
 use crate::saved_pc::SavedPc;
 use crate::stack::Stack;
 use crate::value::Value;
-use esl_heap::list_state;
 
 /// State of a task with regard to running.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -183,45 +182,6 @@ impl Flags {
         self.set_lacks_room(false);
         self.set_collected_for(false);
         if is_collected { Shortage::Collected } else { Shortage::Noted }
-    }
-}
-
-/// Report of a failure.
-#[derive(Clone, Debug)]
-pub(crate) struct FailureReport {
-    /// Account of what happened, and where.
-    pub story: String,
-    /// Line that says that there is no recovery.
-    pub ending: String,
-    /// The account with the variables of its frames, if somebody looks at the run; and the length of that
-    /// without them.
-    pub detailed: Option<(Arc<str>, usize)>,
-}
-
-list_state! { FailureReport { story: Run, ending: Run, detailed: Process } }
-
-impl FailureReport {
-    /// Adds the story of a failure of a cleanup that this one has had run.
-    pub(crate) fn add_cleanup(&mut self, story: &str) {
-        self.story.push_str("In a cleanup after that:\n");
-        self.story.push_str(story);
-    }
-
-    /// Returns the whole report.
-    pub(crate) fn text(&self) -> String {
-        format!("{}{}Aborted\n", self.story, self.ending)
-    }
-
-    /// Returns the whole report, with the variables of its frames if they were noted.
-    pub(crate) fn detailed_text(&self) -> String {
-        match &self.detailed {
-            // Cleanups may have added to it since.
-            Some((detailed, length)) => {
-                let added = self.story.get(*length..).unwrap_or_default();
-                format!("{detailed}{added}{}Aborted\n", self.ending)
-            }
-            None => self.text(),
-        }
     }
 }
 

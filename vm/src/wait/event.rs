@@ -18,7 +18,7 @@ pub(crate) const LAST: usize = 3;
 /// Slot of a task: its index in the table while it lives, then its status.
 pub(crate) const STATE: usize = 4;
 /// Slot of a task: its node in the tree, or that of its maker, while it lives: see [`super::lineage`]. Then
-/// its value or values, or the condition.
+/// its value or values, or the condition, or a cons of that and the history of the failure.
 pub(crate) const RESULT: usize = 5;
 /// Slot of a task: checkpoints that it has passed.
 pub(crate) const CHECKPOINTS: usize = 6;
@@ -70,6 +70,11 @@ pub(super) fn slots_mut(heap: &mut Heap, event: Value) -> Option<&mut [Value; LE
 #[inline]
 pub(crate) fn is_awaited(heap: &Heap, event: Value) -> bool {
     heap.slot_or_nil(event, FIRST).is_true()
+}
+
+/// Returns the condition and the history of a failure, from the result of a task that has failed.
+pub(crate) fn failure(heap: &Heap, result: Value) -> (Value, Value) {
+    heap.as_cons(result).map_or((result, Value::NIL), |pair| (pair.car, pair.cdr))
 }
 
 /// Returns the place of the task that `object` stands for, while it lives.

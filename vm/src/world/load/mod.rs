@@ -38,6 +38,7 @@ mod data;
 mod debug;
 mod definitions;
 mod image;
+mod origin;
 mod prepare;
 
 pub(crate) use debug::texts as debug_texts;
@@ -47,6 +48,8 @@ pub(crate) use image::{
     Images, constant as image_constant, function as image_function, open as open_image,
     origin as image_origin,
 };
+pub(crate) use origin::is_of_library;
+use origin::is_of_module;
 pub use prepare::prepare;
 
 /// Why a module was not loaded.
@@ -251,7 +254,8 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
             let debug = debug::describe(heap, function, pool, names)?;
             let parts =
                 LoadedFunction { function, constants: &constants, name: name_of(function, pool), debug };
-            let code = make_code(heap, verified, &parts, Value::NIL)?;
+            let owner = Value::boolean(is_of_module(module, function));
+            let code = make_code(heap, verified, &parts, owner)?;
             let object = &mut functions[codes.len()];
             if object.is_nil() {
                 *object = code;

@@ -1,0 +1,127 @@
+//! Where failures began: the frames of a task, noted in few words while it fails, and read when they are
+//! reported.
+//!
+//! A note is a simple vector: the code with which the task began, and for each frame, innermost first, its
+//! code and a number, twice the word at which it stands, and one more if it is a form at top level. Failures
+//! that a form takes over from its tasks, or that go on after a cleanup, carry such notes with them: see
+//! `handlers.esl`.
+
+use esl_bytecode::compile::SourcePlace;
+
+use super::task_label;
+use crate::describe::describe;
+use crate::heap::AllocError;
+use crate::host::FailureFrame;
+use crate::interp::start::first_code_of;
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::world::load::{TOP_LEVEL, is_of_library};
+
+/// Fields of a history, and of an origin: see `handlers.esl`.
+const FRAMES: usize = 0;
+const ORIGIN: usize = 2;
+
+/// Most frames, and tasks, of a failure that are told of.
+const MOST_FRAMES: usize = 500;
+const MOST_TASKS: usize = 100;
+/// Words of a function among which one is looked for that has a place.
+const WORDS_TO_PLACE: u32 = 64;
+
+/// A frame of a note.
+pub(crate) struct NotedFrame {
+    /// Name of its function: a symbol or a list, `NIL` if it has none.
+    pub name: Value,
+    /// Whether it is that of a form at top level.
+    pub is_top_level: bool,
+    /// Where it stands.
+    pub place: Option<SourcePlace>,
+    /// Whether its function is one of the library.
+    pub is_of_library: bool,
+}
+
+impl Vm {
+    /// Notes the innermost frames of the running task.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn note_frames(&mut self, limit: usize) -> Result<Value, AllocError> {
+        let mut note = vec![self.scheduler.running.as_ref().map_or(Value::NIL, |task| first_code_of(task))];
+        for frame in self.frames().take(limit) {
+            let Some(code) = self.heap.function_code(frame.function) else { continue };
+            let header = self.heap.header(frame.function);
+            let is_top_level = header.is_some_and(|header| header.aux == TOP_LEVEL);
+            note.extend([code, Value::index(2 * frame.place() as usize + usize::from(is_top_level))]);
+        }
+        self.exchange.charge(4 * note.len());
+        self.heap.alloc_vector(&note)
+    }
+
+    /// Returns the frames of a note.
+    pub(crate) fn noted_frames(&self, note: Value) -> Vec<NotedFrame> {
+        let items = self.heap.vector(note).unwrap_or_default();
+        let read = |pair: &[Value]| {
+            let number = pair[1].as_index()?;
+            let code = self.heap.code(pair[0])?;
+            Some(NotedFrame {
+                name: code.name,
+                is_top_level: number & 1 != 0,
+                place: self.world.source_place(&self.heap, pair[0], (number >> 1) as u32),
+                is_of_library: is_of_library(code),
+            })
+        };
+        items.get(1..).unwrap_or_default().chunks_exact(2).filter_map(read).collect()
+    }
+
+    /// Returns where the body of the task of a note begins.
+    pub(crate) fn beginning(&self, note: Value) -> Option<SourcePlace> {
+        let code = *self.heap.vector(note)?.first()?;
+        self.place_of_code(code)
+    }
+
+    /// Returns the place of the first call in code of the program; `None` for code of the library.
+    pub(crate) fn place_of_code(&self, code: Value) -> Option<SourcePlace> {
+        if is_of_library(self.heap.code(code)?) {
+            return None;
+        }
+        (0..WORDS_TO_PLACE).find_map(|word| self.world.source_place(&self.heap, code, word))
+    }
+
+    /// Returns the calls of a history, innermost first: those of the tasks in which the failure began come
+    /// first. `task` is the one that has failed.
+    pub(crate) fn frames_of_history(&self, history: Value, task: Value) -> Vec<FailureFrame> {
+        let mut notes = vec![(task, history)];
+        let mut history = history;
+        while notes.len() < MOST_TASKS
+            && let Some(origin) = self.heap.as_cons(self.field_of_list(history, ORIGIN))
+        {
+            notes.push((origin.car, origin.cdr));
+            history = origin.cdr;
+        }
+        let mut frames = Vec::new();
+        for (task, history) in notes.into_iter().rev() {
+            let label = task_label(self, task);
+            let row = |frame: NotedFrame| FailureFrame {
+                task: label.clone(),
+                function: match frame.name {
+                    _ if frame.is_top_level => "top level".into(),
+                    name if name.is_nil() => "(LAMBDA)".into(),
+                    name => describe(&self.heap, name),
+                },
+                place: frame.place,
+                is_of_library: frame.is_of_library,
+            };
+            frames.extend(self.noted_frames(self.field_of_list(history, FRAMES)).into_iter().map(row));
+        }
+        frames.truncate(MOST_FRAMES);
+        frames
+    }
+
+    /// Returns a field of a record of the library that is a list; `NIL` if there is none.
+    fn field_of_list(&self, list: Value, index: usize) -> Value {
+        let mut rest = list;
+        for _ in 0..index {
+            rest = self.heap.as_cons(rest).map_or(Value::NIL, |pair| pair.cdr);
+        }
+        self.heap.as_cons(rest).map_or(Value::NIL, |pair| pair.car)
+    }
+}
