@@ -1,8 +1,8 @@
 //! HTTP for the servers of a run: connections, and answers.
 //!
-//! Guarantees: connections are those of a [`Lobby`], until a handler settles them; heads are bounded, in size
-//! and in the time that they take; a request must name the server by an address or as `localhost`, or come over
-//! TLS, so that no page of another site reaches it by a name of its own.
+//! Guarantees: connections are those of a [`Lobby`], until a handler settles them; heads are bounded, in
+//! size and in the time that they take; a request must name the server by an address or as `localhost`, or
+//! come over TLS, so that no page of another site reaches it by a name of its own.
 
 use std::convert::Infallible;
 use std::net::{IpAddr, TcpListener};
@@ -33,8 +33,8 @@ const HEAD_TIME: Duration = Duration::from_secs(10);
 /// Body of an answer.
 pub(super) type HttpBody = BoxBody<Bytes, Infallible>;
 
-/// Serves requests at a listener, over TLS if it has an identity, on the event loop. Connections come into the
-/// lobby.
+/// Serves requests at a listener, over TLS if it has an identity, on the event loop. Connections come into
+/// the lobby.
 ///
 /// # Errors
 /// The reason, if there is no event loop.

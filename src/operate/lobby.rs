@@ -1,8 +1,9 @@
 //! Connections whose peers have not shown that they may be there: how many are open, and for how long.
 //!
-//! Guarantees: at most [`MOST`] at a time, and at most [`MOST_OF_ADDRESS`] from one address. A connection that
-//! comes when there is no room takes the place of the oldest one: of its own address, if that has too many. So
-//! silent connections never keep out a peer that says its secret at once, even from their own address.
+//! Guarantees: at most [`MOST`] at a time, and at most [`MOST_OF_ADDRESS`] from one address. A connection
+//! that comes when there is no room takes the place of the oldest one: of its own address, if that has too
+//! many. So silent connections never keep out a peer that says its secret at once, even from their own
+//! address.
 //!
 //! Source: the way in which OpenSSH drops connections that do not authenticate (`MaxStartups`).
 

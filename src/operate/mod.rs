@@ -171,8 +171,8 @@ fn parse_address(text: &str) -> Result<SocketAddr, &'static str> {
 }
 
 impl OperateOptions {
-    /// Begins to serve what was asked for, before the machine runs a program of this name. Returns what is to be
-    /// told of the end, and dropped after the run.
+    /// Begins to serve what was asked for, before the machine runs a program of this name. Returns what is
+    /// to be told of the end, and dropped after the run.
     ///
     /// # Errors
     /// The exit status, after a message.

@@ -1,7 +1,8 @@
 //! Commands of a session: lines that begin with a colon, or in a replay with a word.
 //!
-//! In a session in which forms are typed, a line that begins with a colon is a command, and never a form: a misspelt command would be a keyword, whose
-//! value says nothing. A keyword is evaluated behind a quote: `':ready`.
+//! In a session in which forms are typed, a line that begins with a colon is a command, and never a form:
+//! a misspelt command would be a keyword, whose value says nothing. A keyword is evaluated behind a quote:
+//! `':ready`.
 
 use std::fmt::Write;
 
@@ -50,7 +51,8 @@ fn unknown(word: &str, commands: &[SessionCommand]) -> String {
     }
 }
 
-/// Returns the command that somebody may have meant: the only one that begins so, or one that is written alike.
+/// Returns the command that somebody may have meant: the only one that begins so, or one that is written
+/// alike.
 pub(crate) fn nearest(word: &str, commands: &[SessionCommand]) -> Option<&'static str> {
     let lower = word.to_lowercase();
     let names = || commands.iter().flat_map(|command| command.names.iter().copied());

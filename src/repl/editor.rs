@@ -65,8 +65,8 @@ pub(crate) struct Editor {
 }
 
 impl Editor {
-    /// Creates an editor that completes words by a function, with the history of earlier sessions in a file of
-    /// this name in the person's home. From now on `screen` prints above the line that is edited.
+    /// Creates an editor that completes words by a function, with the history of earlier sessions in a
+    /// file of this name in the person's home. From now on `screen` prints above the line that is edited.
     pub(crate) fn new(screen: &PromptScreen, history: &str, complete: CompleteWord) -> Editor {
         let config = rustyline::Config::builder()
             .completion_type(CompletionType::List)

@@ -41,11 +41,10 @@ const fn row(names: &'static [&'static str], arguments: &'static str, does: &'st
 /// Name of the file with the commands of earlier sessions, in the person's home.
 const HISTORY: &str = ".esl-replay-history";
 
-/// Replays a run up to the target or the first breakpoint, and obeys the lines of standard input. Returns the
-/// exit status.
+/// Replays a run up to the target or the first breakpoint, and obeys the lines of standard input. Returns
+/// the exit status.
 ///
-/// # Errors
-/// [`RerunError`].
+/// # Errors [`RerunError`].
 pub(super) fn run(
     recorded: Recorded,
     until: Option<Target>,
@@ -95,7 +94,8 @@ fn lock(names: &Mutex<Vec<String>>) -> std::sync::MutexGuard<'_, Vec<String>> {
     names.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns how a word can be completed: the first of a line by a command, another one by a name of the program.
+/// Returns how a word can be completed: the first of a line by a command, another one by a name of the
+/// program.
 fn completions(before: &str, word: &str, names: &[String]) -> Vec<WordCompletion> {
     if before.trim().is_empty() {
         return completions_of(word, COMMANDS);

@@ -404,7 +404,8 @@ fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow, cover
                 "<rect class=\"{class}\" x=\"{x:.1}\" y=\"{y}\" width=\"{width:.1}\" height=\"{BAR_HEIGHT}\"><title>{}, {begin:.3} to {end:.3} ms</title></rect>",
                 escape(&title)
             );
-            // A text that does not fit, or that something would cover, is left out: the bar has it as its title.
+            // A text that does not fit, or that something would cover, is left out: the bar has it as its
+            // title.
             if let Activity::Waits(reason) | Activity::IsSuspended(reason) = &bar.state {
                 let text_width = CHARACTER * reason.chars().count() as f64;
                 if let Some(x) = covered.place_in_bar(x + 4.0, right - 2.0, text_width) {

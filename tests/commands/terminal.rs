@@ -116,8 +116,8 @@ fn what_is_typed_ahead_is_kept() {
     assert_eq!(child.wait().expect("it ends").code(), Some(3));
 }
 
-/// TAB lists the names that a word can become, with what there is to say about them, and completes it when there
-/// is one only.
+/// TAB lists the names that a word can become, with what there is to say about them, and completes it when
+/// there is one only.
 #[test]
 fn a_word_is_completed() {
     let Session { mut person, mut child, mut output, .. } = Session::begin();

@@ -1,13 +1,13 @@
 //! Sessions of operators who are attached to a run: the server.
 //!
 //! The wire protocol is that of SLIME's server, SWANK: packets of forms, each request with a number, each
-//! answer with that of its request. A request says what it needs by its role; one that only looks is answered
-//! by a survey, all others come through the inbox of the machine as calls, aborts and signals.
+//! answer with that of its request. A request says what it needs by its role; one that only looks is
+//! answered by a survey, all others come through the inbox of the machine as calls, aborts and signals.
 //!
-//! Guarantees: a connection over TCP says its secret before anything else is parsed, and soon, and until then it
-//! takes the place of no session; a packet is bounded before it is read, and comes in a bounded time; a session
-//! has a bounded number of requests under way, which end with it, and a bounded number of bytes on their way to
-//! its peer.
+//! Guarantees: a connection over TCP says its secret before anything else is parsed, and soon, and until
+//! then it takes the place of no session; a packet is bounded before it is read, and comes in a bounded
+//! time; a session has a bounded number of requests under way, which end with it, and a bounded number of
+//! bytes on their way to its peer.
 
 pub(super) mod datum;
 mod form;

@@ -412,8 +412,8 @@ impl OperatorSession {
         list([TICKS, bytes, MADE].map(integer))
     }
 
-    /// Calls a function of the library with the number of this session, these texts, and the limits of what it
-    /// may use.
+    /// Calls a function of the library with the number of this session, these texts, and the limits of
+    /// what it may use.
     async fn call_in(&self, function: &str, texts: &[&str]) -> Result<WireForm, OperatorRefusal> {
         let mut arguments = vec![integer(self.number as i64)];
         arguments.extend(texts.iter().map(|text| string(text)));

@@ -76,8 +76,8 @@ pub struct SurveyedTask {
     pub held_by: Vec<u64>,
     /// Place in the program, `FILE:LINE:COLUMN`.
     pub place: Option<String>,
-    /// Time of the machine at which the wait ends at the latest, in nanoseconds, if it is a wait for a time or
-    /// has a timeout.
+    /// Time of the machine at which the wait ends at the latest, in nanoseconds, if it is a wait for a time
+    /// or has a timeout.
     pub ends_at: Option<u64>,
     /// Ticks that it has used.
     pub ticks: u64,
