@@ -296,7 +296,7 @@ impl Repl {
                 let bare = path.strip_prefix('"').and_then(|path| path.strip_suffix('"'));
                 self.call("%REPL-LOAD", bare.unwrap_or(path));
             }
-            ":bt" if argument.trim() == "full" && self.full.is_some() => {
+            ":bt" if path.trim() == "full" && self.full.is_some() => {
                 print!("{}", self.full.as_deref().unwrap_or_default());
             }
             ":bt" => match self.newest_failure() {
