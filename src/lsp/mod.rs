@@ -30,6 +30,7 @@ mod rename;
 mod repair;
 mod scope;
 mod semantic;
+mod uses;
 mod wire;
 
 use std::io::{self, BufRead};

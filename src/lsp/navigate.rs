@@ -10,6 +10,7 @@ use super::document::OpenText;
 use super::links;
 use super::project::Project;
 use super::scope::{LocalBinding, binding_of};
+use super::uses::NameBindings;
 use crate::syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
 
 /// The name at a position: the text, the node, and its binding if it is local.
@@ -61,12 +62,13 @@ pub(super) fn uses_of(text: &OpenText, wanted: &str, bound: Option<LocalBinding>
         }
         None => tree.nodes(),
     };
+    let bindings = NameBindings::new(tree, wanted);
     let is_same = |&node: &NodeId| {
         if bound.is_none() && is_designator(tree, node, wanted) {
             return true;
         }
         tree.name(node).is_some_and(|name| bare_name(name) == wanted)
-            && binding_of(tree, node).map(|binding| binding.name) == bound.map(|binding| binding.name)
+            && bindings.binding_of(node).map(|binding| binding.name) == bound.map(|binding| binding.name)
     };
     nodes.filter(is_same).collect()
 }

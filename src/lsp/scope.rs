@@ -97,7 +97,7 @@ pub(super) fn binding_of(tree: &SyntaxTree, node: NodeId) -> Option<LocalBinding
 
 /// Whether a binding is one of this sort for a name inside its form. The body of a local function is a block
 /// of the function's name.
-fn is_seen(tree: &SyntaxTree, binding: &LocalBinding, sort: LocalSort, node: NodeId) -> bool {
+pub(super) fn is_seen(tree: &SyntaxTree, binding: &LocalBinding, sort: LocalSort, node: NodeId) -> bool {
     let is_block = || {
         let definition = tree.parent(binding.name).map(|definition| tree.range(definition));
         binding.sort == LocalSort::Function
@@ -120,7 +120,7 @@ pub(super) fn sort_at(tree: &SyntaxTree, node: NodeId) -> LocalSort {
 
 /// Returns the number of backquotes around a node that no comma has left, as names in a template and names
 /// of the code that makes it are not the same; `None` for quoted data.
-fn template_level(tree: &SyntaxTree, node: NodeId) -> Option<i32> {
+pub(super) fn template_level(tree: &SyntaxTree, node: NodeId) -> Option<i32> {
     use esl_compiler::reader::lexer::Token;
     let (mut level, mut is_left) = (0, false);
     let mut at = tree.parent(node);
@@ -212,7 +212,7 @@ fn is_clause(tree: &SyntaxTree, list: NodeId) -> bool {
 }
 
 /// Adds what a list binds.
-fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
+pub(super) fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
     let argument = |at: usize| tree.data(list).nth(at);
     let Some(operator) = tree.operator(list) else { return bound_by_clause(tree, list, found) };
     blocks_and_tags(tree, list, &operator, found);
