@@ -99,3 +99,22 @@ fn a_new_project_runs_and_its_tests_pass() {
     assert!(readme.starts_with("# rover\n"), "{readme}");
     assert_eq!(run(&mut eslc(&["new", &project]), "").status, Some(2), "it is there already");
 }
+
+#[test]
+fn the_projects_own_files_are_formatted() {
+    // Programs that show what the reader refuses cannot be among them.
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folders = ["stdlib", "world/modules", "examples", "benches", "playground", "src/new/template"];
+    let folders = folders.into_iter().chain(["conformance/soak"]);
+    let programs = std::fs::read_dir(root.join("conformance/programs")).expect("the folder can be listed");
+    let programs = programs.map(|entry| entry.expect("the folder can be listed").path());
+    let programs = programs.filter(|path| path.is_dir() && !path.ends_with("diagnostics"));
+    let folders: Vec<String> = folders
+        .map(|folder| root.join(folder))
+        .chain(programs)
+        .map(|folder| folder.display().to_string())
+        .collect();
+    let arguments: Vec<&str> = std::iter::once("--check").chain(folders.iter().map(|path| &**path)).collect();
+    let (status, output, errors) = format(&arguments, "");
+    assert_eq!(status, 0, "run `eslc format` on these:\n{output}{errors}");
+}
