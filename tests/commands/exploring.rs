@@ -312,6 +312,10 @@ fn a_lost_update_of_an_object_is_found_by_default() {
         assert_eq!((status, errors.as_str()), (Some(0), ""), "{what}: {output}");
         assert!(output.starts_with("complete: no schedule ends badly (grain ticks, "), "{what}: {output}");
     }
+    // A task that has slept is not where it was before it slept.
+    folder.file("sleeps.esl", "(let ((cell (list 0))) (sleep 3) (setf (car cell) 1))");
+    let (status, output, errors) = run(&folder, &["explore", "sleeps.esl"]);
+    assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
     // When the finer grain is cut off, the verdict says so, and what the coarser one has shown.
     let (status, output, _) = run(&folder, &["explore", "--states", "50", "tank.esl"]);
     assert_eq!(status, Some(7), "{output}");

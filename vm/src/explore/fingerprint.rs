@@ -4,7 +4,7 @@
 //! of them), the values, functions and properties of symbols, facts and rules, timers, and all objects that
 //! can be reached from there. Objects have no addresses in it: each is the number of those that were met
 //! before it, in an order that depends on the state alone. Tables are hashed in the order of their entries,
-//! facts in that of their assertion, times relative to now.
+//! facts in that of their assertion, times relative to now; with points at all ticks, also the time itself.
 //!
 //! Which fields of the machine belong to it is said by `state`, and visited in `content`. Not part of a
 //! state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that will not be read
@@ -29,6 +29,7 @@ use esl_heap::state::{StateSink, Stated};
 use crate::fused::unfused;
 use crate::heap::{Heap, Kind};
 use crate::interp::frames::Frames;
+use crate::schedule::Grain;
 use crate::shape::{Shape, Sort};
 use crate::shared::CopyOnWrite;
 use crate::state::{VisitCourse, VisitVm};
@@ -178,8 +179,13 @@ impl Fingerprints {
         }
         let mut met = std::mem::take(&mut self.met);
         met.clear();
-        let mut walk =
-            Walk { vm, known: self, digest: Digest::default(), met, next: 0, now, task: None, is_strict };
+        let mut digest = Digest::default();
+        // At a tick a task may hold a time that it has read, such as the deadline of a sleep, which relative times
+        // do not tell apart from a later one.
+        if !is_strict && vm.scheduler.points.grain == Some(Grain::Ticks) {
+            digest.add(now);
+        }
+        let mut walk = Walk { vm, known: self, digest, met, next: 0, now, task: None, is_strict };
         walk.machine(walk.vm);
         while let Some(&object) = walk.met.get(walk.next) {
             walk.next += 1;
