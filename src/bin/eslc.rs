@@ -103,10 +103,11 @@ enum EslcAction {
     /// Report errors and warnings, and write nothing
     ///
     /// Files that are named are checked together, as parts of one program; each source in a folder by itself.
-    /// Exit status: 0 no errors; 2 wrong usage, or a file that cannot be read; 3 there are errors, or warnings
-    /// that are denied.
+    /// Exit status: 0 no errors; 2 wrong usage, or a file that cannot be read; 3 there are errors, or
+    /// warnings that are denied.
     Check {
-        /// Source files, or folders, whose `.esl` files are meant; `-` is standard input; by default this folder
+        /// Source files, or folders, whose `.esl` files are meant; `-` is standard input; by default this
+        /// folder
         #[arg(value_name = "FILE")]
         files: Vec<PathBuf>,
         #[command(flatten)]
@@ -129,9 +130,10 @@ enum EslcAction {
     /// Format files as Lisp programmers expect
     ///
     /// Blanks, indentation, lone parentheses and blank lines are put right, and lines of more than 100
-    /// columns are broken; other lines keep their breaks. Comments, strings and all that is read stay the same. What
-    /// stands under what follows from the operators: library macros and those that the file and its modules
-    /// define are indented by the `&body` of their lambda lists, or as `(declare (indent N))` says in them.
+    /// columns are broken; other lines keep their breaks. Comments, strings and all that is read stay the
+    /// same. What stands under what follows from the operators: library macros and those that the file and
+    /// its modules define are indented by the `&body` of their lambda lists, or as `(declare (indent N))`
+    /// says in them.
     #[command(visible_alias = "fmt")]
     Format {
         #[command(flatten)]

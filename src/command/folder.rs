@@ -8,8 +8,8 @@ use super::{USAGE, complain};
 /// Deepest nesting of folders that are searched for files.
 const MAX_DEPTH: usize = 64;
 
-/// Returns the sources (`*.esl`) in a folder and in those below it, in the order of their names. Hidden folders,
-/// those of builds (`target`) and links to folders are left aside.
+/// Returns the sources (`*.esl`) in a folder and in those below it, in the order of their names. Hidden
+/// folders, those of builds (`target`) and links to folders are left aside.
 ///
 /// # Errors
 /// The exit status, after a message, if a folder cannot be read.

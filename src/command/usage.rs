@@ -10,8 +10,8 @@ use super::{USAGE, complain};
 /// Words in place of a subcommand, and the command that does the same.
 pub type Habits = &'static [(&'static str, &'static str)];
 
-/// Parses the command line. One that is wrong ends the process, after a message that says what to type, also if
-/// it begins with a word of `habits`, or with a file where `file_command` takes one.
+/// Parses the command line. One that is wrong ends the process, after a message that says what to type, also
+/// if it begins with a word of `habits`, or with a file where `file_command` takes one.
 pub fn parse<C: Parser + CommandFactory>(file_command: &str, habits: Habits) -> C {
     let arguments: Vec<OsString> = std::env::args_os().collect();
     let error = match C::try_parse_from(&arguments) {

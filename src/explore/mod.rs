@@ -133,8 +133,8 @@ pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result
 }
 
 /// Follows a list of choices, on a machine that `prepare` has changed, to the end of the run if `ends`, else
-/// to the last of them. `told` is told of each choice that is not the first one, just before it is made, and of
-/// each use of a variable of the program, after it.
+/// to the last of them. `told` is told of each choice that is not the first one, just before it is made, and
+/// of each use of a variable of the program, after it.
 ///
 /// # Errors
 /// As [`program::run`], and the errors of `prepare`.

@@ -61,8 +61,8 @@ fn put_uses<'a>(told: &mut Vec<Told<'a>>, mut uses: Vec<ToldUse<'a>>) {
     }
 }
 
-/// Returns of each step whether it is a use that matters: of a variable that several tasks use, of which one sets
-/// it, and not before the last value that its first user gives it alone.
+/// Returns of each step whether it is a use that matters: of a variable that several tasks use, of which one
+/// sets it, and not before the last value that its first user gives it alone.
 fn uses_that_matter(steps: &[ScheduleStep]) -> Vec<bool> {
     let mut by_variable: HashMap<&str, Vec<(usize, &str, bool)>> = HashMap::new();
     for (at, step) in steps.iter().enumerate() {
@@ -182,7 +182,8 @@ pub(super) fn text(switch: &Switch, forms: &mut SourceForms) -> String {
 mod tests {
     use super::*;
 
-    /// Returns the uses that are told of a schedule in which tasks use variables, in the form `A:x=1` or `A:x?1`.
+    /// Returns the uses that are told of a schedule in which tasks use variables, in the form `A:x=1` or
+    /// `A:x?1`.
     fn told_uses(uses: &[&str]) -> Vec<String> {
         let step = |text: &&str| {
             let (task, rest) = text.split_once(':').expect("a task comes first");

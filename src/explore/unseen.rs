@@ -1,8 +1,8 @@
 //! The places of a program that tasks may share and that explorations at most grains do not see.
 //!
 //! A program is read, not run: each instruction and call that changes an object counts as a change of a place
-//! that tasks may share, wherever the object comes from. So a program without unseen changes has no places that
-//! tasks share but those that grain `variables` sees, and an exploration at that grain speaks of all its
+//! that tasks may share, wherever the object comes from. So a program without unseen changes has no places
+//! that tasks share but those that grain `variables` sees, and an exploration at that grain speaks of all its
 //! schedules. The converse does not hold: an object that is changed may be known to one task only.
 //!
 //! Not here: changes by functions that the program makes while it runs, which count as unseen themselves
@@ -172,7 +172,8 @@ const CHANGING: &[(UnseenKind, &[&str])] = &[
     (UnseenKind::Code, &["EVAL", "COMPILE", "LOAD"]),
 ];
 
-/// Returns the kinds of changes that a program makes and that a grain does not see, each with its first place.
+/// Returns the kinds of changes that a program makes and that a grain does not see, each with its first
+/// place.
 pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
     let module = program.module();
     let sees_variables = match grain {

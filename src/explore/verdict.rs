@@ -1,7 +1,7 @@
 //! What an exploration speaks of: the grain and the timers of its schedules, and what it has left out.
 //!
-//! A search that has tried everything at its grain proves something about the program only if the grain sees all
-//! that the tasks of the program share.
+//! A search that has tried everything at its grain proves something about the program only if the grain sees
+//! all that the tasks of the program share.
 
 use std::fmt;
 
@@ -9,8 +9,8 @@ use super::unseen::{UnseenKind, unseen_changes};
 use super::{Exploration, Grain, SearchLimit, Settings, TimerGrain, UnseenChange};
 use crate::program::Program;
 
-/// Returns the grains at which a program is explored, one after the other: the one that is asked for, otherwise
-/// `variables`, and then `ticks` if the program changes what `variables` does not see.
+/// Returns the grains at which a program is explored, one after the other: the one that is asked for,
+/// otherwise `variables`, and then `ticks` if the program changes what `variables` does not see.
 pub fn grains(program: &Program, wanted: Option<Grain>) -> Vec<Grain> {
     match wanted {
         Some(grain) => vec![grain],

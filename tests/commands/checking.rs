@@ -1,4 +1,5 @@
-//! `eslc check`: warnings that are denied or allowed, folders; and what to type in place of a wrong subcommand.
+//! `eslc check`: warnings that are denied or allowed, folders; and what to type in place of a wrong
+//! subcommand.
 
 use esl_conformance::process;
 

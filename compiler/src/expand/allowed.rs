@@ -50,8 +50,8 @@ impl AllowedWarnings {
 }
 
 impl Expander {
-    /// Drops the warnings that forms allow. Of one that is about several places, those are dropped at which it is
-    /// allowed, and of the others the first ones are kept.
+    /// Drops the warnings that forms allow. Of one that is about several places, those are dropped at which
+    /// it is allowed, and of the others the first ones are kept.
     pub fn drop_allowed(&self, findings: &mut Vec<Diagnostic>) {
         findings.retain_mut(|finding| {
             let code = finding.code;

@@ -180,8 +180,8 @@ impl Fingerprints {
         let mut met = std::mem::take(&mut self.met);
         met.clear();
         let mut digest = Digest::default();
-        // At a tick a task may hold a time that it has read, such as the deadline of a sleep; relative times do
-        // not tell whether that has passed.
+        // At a tick a task may hold a time that it has read, such as the deadline of a sleep; relative times
+        // do not tell whether that has passed.
         if !is_strict && vm.scheduler.points.grain == Some(Grain::Ticks) {
             digest.add(now);
         }

@@ -19,12 +19,11 @@
 //! [`Grain::Reads`] also before it looks at what others do: before it counts signals, asks what became of a
 //! task, or queries the database; with [`Grain::Variables`] also at a tick after it has used a special
 //! variable of the program, and with [`Grain::Ticks`] at every tick. Nothing between two points is visible to
-//! other tasks by these means, so every schedule of the machine behaves like one of those explored. Places that
-//! tasks share in other ways (slots, elements, pairs, tables, variables that closures share) are seen only with
-//! [`Grain::Ticks`], unless all uses of them are in critical sections, which are one step each. A caller that
-//! calls a search complete has to know that the program has none.
-//! Where a program itself chooses, by `choose`, each way is tried.
-//! A task that reaches no point is stopped after [`Settings::turn`] ticks.
+//! other tasks by these means, so every schedule of the machine behaves like one of those explored. Places
+//! that tasks share in other ways (slots, elements, pairs, tables, variables that closures share) are seen
+//! only with [`Grain::Ticks`], unless all uses of them are in critical sections, which are one step each. A
+//! caller that calls a search complete has to know that the program has none. Where a program itself chooses,
+//! by `choose`, each way is tried. A task that reaches no point is stopped after [`Settings::turn`] ticks.
 //!
 //! **Choices.** At each point any runnable task may continue, whatever its priority (every task has a turn at
 //! some time). The task that has just run comes first, then the others from the oldest to the newest; a
