@@ -10,10 +10,8 @@ use esl_bytecode::span::Span;
 use super::expander::Expander;
 use super::form::{Checked, Form, quoted};
 use super::job::To;
+use super::warning::{AND_HERE, AllowedWarnings};
 use crate::diagnostic::code;
-
-/// Text of the further places that a finding is about.
-pub(super) const AND_HERE: &str = "and here";
 
 /// Uses of an undefined name that are shown besides the first.
 const SHOWN: usize = 3;
@@ -29,24 +27,6 @@ pub(super) fn with_allowed_warnings(
     let jobs = expander.body(body, to);
     expander.schedule(jobs);
     Ok(())
-}
-
-/// Warnings that are not reported in the place of a form.
-#[derive(Clone, Debug)]
-pub(super) struct AllowedWarnings {
-    /// Place of the form.
-    span: Span,
-    /// Codes of the warnings.
-    codes: Vec<&'static str>,
-}
-
-impl AllowedWarnings {
-    /// Returns whether these include a warning of this code at this place.
-    pub(super) fn include(&self, code: &'static str, place: Span) -> bool {
-        let here = self.span;
-        let is_inside = place.source == here.source && here.start <= place.start && place.end <= here.end;
-        is_inside && self.codes.contains(&code)
-    }
 }
 
 impl Expander {
@@ -101,7 +81,7 @@ impl Expander {
                 None => return Err(form.malformed_at(span, &format!("knows no warning `{name}`"))),
             }
         }
-        self.allowed.push(AllowedWarnings { span: form.span, codes });
+        self.allowed.push(AllowedWarnings::new(form.span, codes));
         Ok(body.to_vec())
     }
 }

@@ -13,7 +13,6 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashSet;
 
-use super::allowed::AllowedWarnings;
 use super::chunk::{Chunk, OpenChunk, Purpose};
 use super::failure::{FailurePlace, MacroFailure};
 use super::form::{Checked, Form, Make, name};
@@ -22,6 +21,7 @@ use super::job::{AwaitedOutcome, Job, To, Top};
 use super::origin::{OriginId, Origins};
 use super::scope::Scope;
 use super::setf::SetfExpansion;
+use super::warning::AllowedWarnings;
 use crate::core::NodeKind;
 use crate::diagnostic::code;
 

@@ -69,7 +69,7 @@
 //! # Layers
 //!
 //! Data and tables come first (`form`, `scope`, `lambda_list`, `function`, `setf`, `origin`, `job`, `chunk`,
-//! `failure`, `trap`, `global`, `argument`, `directive`, `unit`), then the [`Expander`], its findings
+//! `failure`, `trap`, `global`, `argument`, `directive`, `warning`, `unit`), then the [`Expander`], its findings
 //! (`finding`) and its checks of forms as they are written (`check`), then one file for each family of
 //! forms, whose methods are methods of the `Expander`, and last the table of operators. A file uses only
 //! files before it; `tests/layers.rs` holds that.
@@ -113,6 +113,7 @@ mod trap;
 mod unit;
 mod values;
 mod variable;
+mod warning;
 
 pub use chunk::{Chunk, Purpose};
 pub use expander::{Expander, Stop};

@@ -8,11 +8,11 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Symbol, setf_cell};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::allowed::AND_HERE;
 use super::argument::{refused_by, usage};
 use super::form::{is_known, name, name_with_package, plain, with_namesake};
 use super::function::FunctionName;
 use super::global::{GlobalUses, NameUsed, PendingCall, accepts, wrong_count};
+use super::warning::AND_HERE;
 use crate::diagnostic::code;
 use crate::habit::word;
 
