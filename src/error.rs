@@ -132,7 +132,7 @@ impl From<CallError> for Error {
         match error {
             CallError::Failed { cause, message, report, arguments, frames } => {
                 let arguments = arguments.0.iter().map(Data::from_datum).collect();
-                Error::Failed { cause, message, report, arguments, frames }
+                Error::Failed { cause, message, report, arguments, frames: frames.into_vec() }
             }
             CallError::Aborted => Error::Aborted,
             CallError::Deadlocked => Error::Deadlocked,

@@ -52,7 +52,7 @@ enum BuildError {
     /// A file cannot be loaded.
     NotLoaded(String, LoadError),
     /// The top level of a file fails.
-    Fails(String, CallError),
+    Fails(String, Box<CallError>),
     /// The library contains an object that no file can hold.
     NotWritten(WriteError),
 }
@@ -143,7 +143,7 @@ impl LibraryBuild {
         let loaded = self.machine.load_module(&module);
         let functions = loaded.map_err(|error| BuildError::NotLoaded(name.into(), error))?;
         let ran = self.machine.run_toplevel(functions, u64::MAX);
-        ran.map_err(|failure| BuildError::Fails(name.into(), failure))?;
+        ran.map_err(|failure| BuildError::Fails(name.into(), Box::new(failure)))?;
         self.modules.push(module);
         Ok(())
     }

@@ -1,5 +1,7 @@
 //! Which warnings of the compiler a command takes for errors, and which it leaves out.
 
+use std::fmt;
+
 use clap::Args;
 use esl_bytecode::diagnostic::Severity;
 use esl_compiler::diagnostic::code;
@@ -22,22 +24,44 @@ pub struct WarningOptions {
     pub allow: Vec<String>,
 }
 
+/// Reason why a code cannot be denied or allowed.
+#[derive(Clone, Debug)]
+enum CodeError {
+    /// It is the code of an error.
+    OfError,
+    /// There is no such code; the name of the nearest one, if one is near.
+    Unknown(Option<&'static str>),
+}
+
+impl fmt::Display for CodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            CodeError::OfError => {
+                f.write_str("this is the code of an error, which cannot be allowed and is always denied")
+            }
+            CodeError::Unknown(Some(name)) => {
+                write!(f, "no warning has this code; did you mean `{name}`?")
+            }
+            CodeError::Unknown(None) => {
+                write!(f, "no warning has this code: it stands in brackets in a message; `{ALL}` is all")
+            }
+        }
+    }
+}
+
+impl std::error::Error for CodeError {}
+
 /// Checks the code of a warning.
-fn parse_code(text: &str) -> Result<String, String> {
+fn parse_code(text: &str) -> Result<String, CodeError> {
     match code::find(text) {
         _ if text == ALL => Ok(text.into()),
         Some(code) if code.severity == Severity::Warning => Ok(text.into()),
-        Some(_) => Err("this is the code of an error, which cannot be allowed and is always denied".into()),
+        Some(_) => Err(CodeError::OfError),
         None => {
             let warnings = code::ALL.iter().filter(|code| code.severity == Severity::Warning);
             let near = warnings.map(|code| (TextDiff::from_chars(code.name, text).ratio(), code.name));
             let near = near.filter(|(likeness, _)| *likeness > 0.7).max_by(|a, b| a.0.total_cmp(&b.0));
-            Err(match near {
-                Some((_, name)) => format!("no warning has this code; did you mean `{name}`?"),
-                None => {
-                    format!("no warning has this code: it stands in brackets in a message; `{ALL}` is all")
-                }
-            })
+            Err(CodeError::Unknown(near.map(|(_, name)| name)))
         }
     }
 }

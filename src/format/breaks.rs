@@ -181,7 +181,8 @@ impl Shapes<'_> {
         let is_leaf = |node: NodeId| matches!(tree.kind(node), SyntaxKind::Leaf(_));
         let is_call = matches!(self.shape(list), Indentation::Call(_));
         let is_short = |node: NodeId| {
-            !tree.is_comment(node) && !tree.text(node).contains('\n') && !(is_call && self.is_keyword(node))
+            let is_option = is_call && self.is_keyword(node);
+            !tree.is_comment(node) && !tree.text(node).contains('\n') && !is_option
         };
         let has_leaves = || tree.data(list).skip(1 + usize::from(is_call)).any(is_leaf);
         tree.children(list).all(is_short) && has_leaves()

@@ -306,10 +306,10 @@ impl Drawing {
         for &(time, from, to, _) in &self.arrows {
             let x = scale.x(time);
             let (upper, lower) = (from.min(to), from.max(to));
-            for row in upper + 1..=lower {
-                covered[row].above.push(x);
+            for (row, covered) in covered.iter_mut().enumerate().take(lower + 1).skip(upper + 1) {
+                covered.above.push(x);
                 if row < lower {
-                    covered[row].bars.push((x - 1.0, x + 1.0));
+                    covered.bars.push((x - 1.0, x + 1.0));
                 }
             }
         }

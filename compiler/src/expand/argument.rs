@@ -42,7 +42,7 @@ static KINDS: LazyLock<Vec<BuiltinKinds>> = LazyLock::new(|| {
 
 /// Returns the first constant among the arguments of a builtin that it refuses, and what is wrong with it: "a
 /// number here, not the string `"2"`".
-pub(super) fn refused<'a>(builtin: Builtin, args: &'a [Datum]) -> Option<(&'a Datum, String)> {
+pub(super) fn refused(builtin: Builtin, args: &[Datum]) -> Option<(&Datum, String)> {
     let kinds = KINDS.get(builtin.number() as usize)?;
     args.iter().enumerate().find_map(|(index, argument)| {
         let kind = (*kinds.positional.get(index).unwrap_or(&kinds.rest))?;

@@ -115,7 +115,7 @@ fn bare_bindings(list: &Datum) -> Option<String> {
         parts.into_iter().filter(|part| part.as_symbol().is_none_or(|symbol| symbol.name() != "=")).collect();
     let is_pair = |pair: &&[&Datum]| pair.len() == 2 && pair[0].as_symbol().is_some();
     let pairs: Vec<&[&Datum]> = plain_parts.chunks(2).collect();
-    if pairs.len() > 4 || !pairs.iter().all(|pair| is_pair(&pair)) {
+    if pairs.len() > 4 || !pairs.iter().all(is_pair) {
         return None;
     }
     let pairs = pairs

@@ -58,6 +58,7 @@ mod livelock;
 mod numbers;
 mod point;
 mod search;
+mod step;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -69,8 +70,9 @@ use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
 use crew::{Crew, LoneCrew, RunPlace, ThreadCrew};
-pub use point::{FollowedRun, ScheduleEvent, ScheduleStep, StandingTask, Switch, TellStep};
+pub use point::FollowedRun;
 use search::Search;
+pub use step::{ScheduleEvent, ScheduleStep, StandingTask, Switch, TellStep};
 use trace::{MergePlace, Merged, Merging, TraceEnd};
 
 /// When timers fire in an exploration.

@@ -1,119 +1,16 @@
 //! Running from point to point.
 
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 use smallvec::SmallVec;
 
+use super::step::{Runnable, ScheduleEvent, ScheduleStep, TellStep, is_of_library, switch, tell_uses};
 use super::{Settings, TimerGrain};
-use crate::describe::describe;
 use crate::heap::Kind;
 use crate::heap::layout::SymbolObject;
-use crate::report::{program_place, task_label};
 use crate::run::{self, RunOutcome};
-use crate::schedule::{Choices, Due, Grain, VariableUse};
+use crate::schedule::{Choices, Due, Grain};
 use crate::task::{TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
-
-/// What there is to choose from at a point.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Runnable<'a> {
-    /// The tasks that can run; with ways, the one that asks comes first.
-    pub(super) tasks: &'a [TaskIndex],
-    /// Number of ways in which the first task may go on, if it is the one that asks, by `choose`.
-    pub(super) ways: Option<u32>,
-    /// Whether the first of the tasks is the one that ran last.
-    pub(super) has_last: bool,
-    /// Whether, as the last choice, time may pass up to the first timer.
-    pub(super) has_timer: bool,
-}
-
-impl Runnable<'_> {
-    /// Returns the number of choices.
-    pub(super) fn count(&self) -> u32 {
-        self.ways.unwrap_or(self.tasks.len() as u32 + u32::from(self.has_timer))
-    }
-}
-
-/// A choice of a schedule other than the first one that was possible.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Switch {
-    /// A task that could have gone on had to stop, and another one went on.
-    Preemption {
-        /// The task that stopped, and the place of the program before which it stood.
-        stopped: StandingTask,
-        /// The task that went on, and from where.
-        next: StandingTask,
-    },
-    /// No task was running, and another one than the oldest went on.
-    Order {
-        /// The oldest task that could have gone on.
-        oldest: StandingTask,
-        /// The task that went on.
-        next: StandingTask,
-    },
-    /// Time has passed, up to the first timer, before a task went on.
-    Timer {
-        /// The task that could have gone on.
-        task: StandingTask,
-        /// Nanoseconds that have passed.
-        passed: u64,
-    },
-    /// `choose` has taken another form than its first.
-    Choice {
-        /// The task that has asked.
-        task: StandingTask,
-        /// Number of the form, from 0 on.
-        form: u32,
-    },
-}
-
-/// What happens in a schedule, as it is told.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ScheduleStep {
-    /// Time of the machine's clock, in nanoseconds.
-    pub time: u64,
-    /// What happens.
-    pub event: ScheduleEvent,
-}
-
-/// A choice of a schedule, or what a task does between two of them.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum ScheduleEvent {
-    /// A choice other than the first one that was possible.
-    Switch(Switch),
-    /// A task has read or set a special variable of the program that it has not bound.
-    Use {
-        /// What reports call the task.
-        task: String,
-        /// Name of the variable.
-        variable: String,
-        /// The value, as a short text.
-        value: String,
-        /// Whether the variable was set.
-        is_set: bool,
-    },
-}
-
-/// Is told what happens in a schedule.
-pub type TellStep<'a> = dyn FnMut(ScheduleStep) + 'a;
-
-/// A task at a place of the program.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct StandingTask {
-    /// What reports call the task.
-    pub label: String,
-    /// Where it stands, as `file:line:column`, if it has begun.
-    pub place: Option<String>,
-}
-
-impl StandingTask {
-    fn of(vm: &Vm, index: TaskIndex) -> StandingTask {
-        let Some(task) = vm.scheduler.tasks.at(index) else {
-            return StandingTask { label: "a task".into(), place: None };
-        };
-        StandingTask { label: task_label(vm, task.object), place: program_place(vm, task) }
-    }
-}
 
 /// A run by a list of choices, which may be given its ticks in portions.
 #[derive(Clone, Debug)]
@@ -218,54 +115,6 @@ fn follow(
     vm.scheduler.points.uses = None;
     vm.end_following();
     outcome
-}
-
-/// Tells of the uses of the program's variables since the last point.
-fn tell_uses(vm: &mut Vm, told: &mut TellStep<'_>) {
-    let uses = vm.scheduler.points.uses.as_mut().map(std::mem::take).unwrap_or_default();
-    if uses.is_empty() {
-        return;
-    }
-    let mut is_of_program = vec![false; uses.len()];
-    vm.world.each_symbol(&mut |symbol, object| {
-        for (used, is_of_program) in uses.iter().zip(&mut is_of_program) {
-            // Names that begin with `%` are those of the library's machinery, such as the object of a fluent.
-            *is_of_program |=
-                used.symbol == object && !is_of_library(symbol) && !symbol.name().starts_with('%');
-        }
-    });
-    for (VariableUse { task, symbol, value, is_set }, is_of_program) in uses.into_iter().zip(is_of_program) {
-        if is_of_program {
-            let object = vm.scheduler.tasks.iter().find(|other| other.number == task);
-            let object = object.map_or(Value::NIL, |task| task.object);
-            let (task, variable) = (task_label(vm, object), describe(&vm.heap, symbol));
-            let event = ScheduleEvent::Use { task, variable, value, is_set };
-            told(ScheduleStep { time: vm.scheduler.clock.now, event });
-        }
-    }
-}
-
-/// Returns whether a symbol belongs to the library.
-fn is_of_library(symbol: &Symbol) -> bool {
-    [CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE].iter().any(|name| symbol.is_in(name))
-}
-
-/// Describes a choice that is not the first.
-fn switch(vm: &mut Vm, runnable: Runnable<'_>, choice: u32) -> Switch {
-    let first = StandingTask::of(vm, runnable.tasks[0]);
-    if runnable.ways.is_some() {
-        return Switch::Choice { task: first, form: choice };
-    }
-    if choice as usize == runnable.tasks.len() && runnable.has_timer {
-        let now = vm.scheduler.clock.now;
-        let passed = vm.scheduler.first_timer().map_or(0, |time| time.saturating_sub(now));
-        return Switch::Timer { task: first, passed };
-    }
-    let next = StandingTask::of(vm, runnable.tasks[choice as usize % runnable.tasks.len()]);
-    match runnable.has_last {
-        true => Switch::Preemption { stopped: first, next },
-        false => Switch::Order { oldest: first, next },
-    }
 }
 
 /// Makes tasks stop at points from now on.

@@ -39,7 +39,7 @@ pub enum CallError {
         /// Arguments of the failure, if its cause is one of the program's.
         arguments: FailureArguments,
         /// The calls that the failure has left unfinished, innermost first.
-        frames: Vec<FailureFrame>,
+        frames: Box<[FailureFrame]>,
     },
     /// The task was aborted.
     Aborted,
@@ -133,7 +133,7 @@ impl Vm {
         let result = self.result(id);
         end_task(self, id);
         let report = self.report(id);
-        let frames = self.failure_frames(id);
+        let frames = self.failure_frames(id).into();
         self.forget(id);
         let error = match (result, outcome) {
             (TaskResult::Succeeded(values), _) => return Ok(values),

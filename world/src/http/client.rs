@@ -305,17 +305,18 @@ async fn answer(exchange: Arc<HttpExchange>) -> Completion {
         return Err(http_failure("the server switches to another protocol"));
     }
     let mut coding = Coding::Identity;
-    if !exchange.takes_any_coding && !hyper::body::Body::is_end_stream(&incoming) {
-        if let Some(name) = head.headers.get(header::CONTENT_ENCODING) {
-            let name = String::from_utf8_lossy(name.as_bytes()).into_owned();
-            let count = head.headers.get_all(header::CONTENT_ENCODING).iter().count();
-            coding = Coding::named(&name).filter(|_| count == 1).ok_or_else(|| {
-                http_failure(format!(
-                    "the body has the content coding `{}`, which is unknown",
-                    name.escape_debug()
-                ))
-            })?;
-        }
+    if !exchange.takes_any_coding
+        && !hyper::body::Body::is_end_stream(&incoming)
+        && let Some(name) = head.headers.get(header::CONTENT_ENCODING)
+    {
+        let name = String::from_utf8_lossy(name.as_bytes()).into_owned();
+        let count = head.headers.get_all(header::CONTENT_ENCODING).iter().count();
+        coding = Coding::named(&name).filter(|_| count == 1).ok_or_else(|| {
+            http_failure(format!(
+                "the body has the content coding `{}`, which is unknown",
+                name.escape_debug()
+            ))
+        })?;
     }
     if !coding.is_identity() {
         // They describe the body before it was decoded.

@@ -335,7 +335,8 @@ fn check(head: &Parts) -> Result<(), (StatusCode, &'static str)> {
         return Err((StatusCode::NOT_IMPLEMENTED, "this server is not a proxy"));
     }
     let path = head.uri.path();
-    if !path.starts_with('/') && !(path == "*" && head.method == Method::OPTIONS) {
+    let is_of_server = path == "*" && head.method == Method::OPTIONS;
+    if !path.starts_with('/') && !is_of_server {
         return Err((StatusCode::BAD_REQUEST, "the target of the request is not a path"));
     }
     let mut hosts = head.headers.get_all(header::HOST).iter();

@@ -98,7 +98,7 @@ impl Follower {
                 _ = self.watcher.unwatch(path);
             }
         }
-        let is_itself = event.paths.iter().any(|path| *path == self.target);
+        let is_itself = event.paths.contains(&self.target);
         let mut changes = Vec::new();
         if let Some(kind) = kind_of(event.kind).filter(|_| is_itself) {
             // Two watches may report one end.
@@ -120,7 +120,7 @@ impl Follower {
         match (self.known, now) {
             (Some(_), None) => changes.push(("DELETED", self.target.clone())),
             (before, Some(_)) if before != now => {
-                if !changes.last().is_some_and(|(kind, _)| *kind == "CREATED") {
+                if changes.last().is_none_or(|(kind, _)| *kind != "CREATED") {
                     changes.push(("CREATED", self.target.clone()));
                 }
                 // They may have come before the folder was watched.
