@@ -1,6 +1,6 @@
 //! From the names of modules to their files, and from tests to their runs.
 
-use esl_bytecode::compile::Required;
+use esl_bytecode::compile::{MODULE_SOURCES, Required};
 use lsp_types::{
     CodeLens, CodeLensParams, Command, DocumentLink, DocumentLinkParams, Location,
     TextDocumentPositionParams, Uri,
@@ -27,9 +27,10 @@ fn required_module(tree: &SyntaxTree, form: NodeId) -> Option<(String, NodeId)> 
 fn file_of(project: &Project, text: &OpenText, name: &str) -> Option<Uri> {
     match project.module_path(&text.path()).find(name).ok()? {
         Required::Source { name: file, text } => {
-            let path = std::path::Path::new(&file);
-            let path =
-                if path.exists() { path.into() } else { shown_source(&format!("modules/{file}"), &text)? };
+            let path = match file.strip_prefix(MODULE_SOURCES) {
+                Some(name) => shown_source(&format!("modules/{name}"), &text)?,
+                None => file.as_str().into(),
+            };
             uri_of(&path)
         }
         _ => None,

@@ -291,7 +291,7 @@ fn a_lost_update_of_an_object_is_found_by_default() {
         let text = |update: &str| {
             format!(
                 "(defstruct tank level)\n(defun inc (n) (+ n 1))\n(let ({binding})\n  \
-                 (task-net (one {update}) (two {update}))\n  (unless (= {place} 2) (exit 9)))\n"
+                 (task-net (one (inc 0) {update}) (two (inc 0) {update}))\n  (unless (= {place} 2) (exit 9)))\n"
             )
         };
         folder.file("tank.esl", text(&update));

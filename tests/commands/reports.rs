@@ -15,7 +15,7 @@ fn report(name: &str, program: &str, options: &[&str]) -> Vec<String> {
     run.errors.replace(&source, "f.esl").lines().map(str::to_owned).collect()
 }
 
-const FUNCTIONS: &str = "(defun inner () (car 5))
+const FUNCTIONS: &str = "(defun inner () (car (identity 5)))
 (defun middle ()
   (list (inner)))
 (defun outer (x) (list (middle) x))

@@ -111,9 +111,12 @@ fn skip_to(close: char, characters: &mut Peekable<Chars<'_>>) -> Option<()> {
 mod tests {
     use super::*;
 
+    /// A control string, and the least and the largest number of its arguments.
+    type Row = (&'static str, Option<(usize, Option<usize>)>);
+
     #[test]
     fn directives_take_arguments() {
-        let table: &[(&str, Option<(usize, Option<usize>)>)] = &[
+        let table: &[Row] = &[
             ("plain", Some((0, Some(0)))),
             ("~a and ~s~%", Some((2, Some(2)))),
             ("~,2f ~10d ~vd", Some((4, Some(4)))),

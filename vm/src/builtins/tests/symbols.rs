@@ -54,7 +54,7 @@ fn functions() {
         ("(%function-cell '(setf car))", "(SETF CAR)"),
         ("(%set-function $11 $1)", "(SETF CAR)"),
         ("(fboundp '(setf car))", "T"),
-        ("(fboundp '(setf))", "type-error (SETF) SYMBOL"),
+        ("(fboundp '(setf))", "type-error (SETF) (OR SYMBOL (CONS (EQL SETF) (CONS SYMBOL NULL)))"),
         ("(%set-macro 'first-of $1)", "FIRST-OF"),
         ("(macro-function 'first-of)", "<Some(Function)>"),
         ("(macro-function 'first-of '((first-of)))", "NIL"),
