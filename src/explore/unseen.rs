@@ -148,6 +148,7 @@ const CHANGING: &[(UnseenKind, &[&str])] = &[
         &[
             "%SET-SLOT",
             "%SET-STRUCTURE-REF",
+            "%SET-SLOT-VALUE",
             "%SET-SLOT-VALUE-OF",
             "SLOT-MAKUNBOUND",
             "SHARED-INITIALIZE",

@@ -52,7 +52,7 @@ use layout::{LayoutExtent, lay_out};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FormatError {
-    /// The text cannot be read: a list, a string or a comment has no end, say.
+    /// The text cannot be read: a list, a string or a comment has no end, say, or it is of another language.
     Unreadable,
     /// The formatted text would be read differently, which is a fault of the formatter.
     Changed,
@@ -98,10 +98,8 @@ pub fn format_edits(
         return Err(FormatError::Unreadable);
     }
     let edits = lay_out(tree, styles, lines, LayoutExtent::All);
-    match same::is_same(tree, &SyntaxTree::new(Edit::apply(tree.source(), &edits))) {
-        true => Ok(edits),
-        false => Err(FormatError::Changed),
-    }
+    same::check_same(tree, &SyntaxTree::new(Edit::apply(tree.source(), &edits)))?;
+    Ok(edits)
 }
 
 /// Returns what changes when the lines of a text are indented: all of them, or those with these numbers,

@@ -3,14 +3,18 @@
 use esl_bytecode::package::Qualifier;
 use esl_compiler::reader::{BareEnvironment, Reader, print};
 
+use super::FormatError;
 use crate::syntax::{SyntaxKind, SyntaxTree};
 
-/// Returns whether two texts have the same tokens and comments in the same lists, and the reader reads the
-/// same data of both.
-pub(super) fn is_same(before: &SyntaxTree, after: &SyntaxTree) -> bool {
-    before.nodes() == after.nodes()
-        && before.nodes().all(|node| essence(before, node) == essence(after, node))
-        && is_same_data(before.source(), after.source())
+/// Checks that two texts have the same tokens and comments in the same lists, and that the reader reads the same
+/// data of both.
+///
+/// # Errors
+/// [`FormatError`]: `Unreadable` if the reader refuses the first text where they differ.
+pub(super) fn check_same(before: &SyntaxTree, after: &SyntaxTree) -> Result<(), FormatError> {
+    let is_same = before.nodes() == after.nodes()
+        && before.nodes().all(|node| essence(before, node) == essence(after, node));
+    if is_same { check_same_data(before.source(), after.source()) } else { Err(FormatError::Changed) }
 }
 
 /// Returns what must stay of a node: its kind, what contains it, and the text of a token or comment.
@@ -24,22 +28,24 @@ fn essence(tree: &SyntaxTree, node: u32) -> (SyntaxKind, Option<u32>, &str) {
     (tree.kind(node), tree.parent(node), text)
 }
 
-fn is_same_data(before: &str, after: &str) -> bool {
+fn check_same_data(before: &str, after: &str) -> Result<(), FormatError> {
     let mut environments = (BareEnvironment::new(), BareEnvironment::new());
     let mut readers = (Reader::new(Default::default(), before), Reader::new(Default::default(), after));
     loop {
         let read = (readers.0.next(&mut environments.0), readers.1.next(&mut environments.1));
         match read {
-            (None, None) => return true,
+            (None, None) => return Ok(()),
             (Some(Ok(one)), Some(Ok(other))) => {
                 let [one, other] = [one, other].map(|datum| print(&datum, &|_| Qualifier::None));
                 if one != other {
-                    return false;
+                    return Err(FormatError::Changed);
                 }
             }
             // What the reader refuses of both, such as the name of a package that is not there.
             (Some(Err(one)), Some(Err(other))) if one.code == other.code => {}
-            _ => return false,
+            // The notation of another language depends on blanks: `f(x)`.
+            (Some(Err(_)), _) => return Err(FormatError::Unreadable),
+            _ => return Err(FormatError::Changed),
         }
     }
 }

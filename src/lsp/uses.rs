@@ -88,7 +88,7 @@ mod tests {
             let bindings = NameBindings::new(&tree, name);
             let uses = tree.nodes().filter(|&node| tree.name(node).map(bare_name).as_deref() == Some(name));
             let uses: Vec<NodeId> = uses.collect();
-            assert!(uses.len() > 4);
+            assert!(uses.len() >= 4);
             for node in uses {
                 assert_eq!(bindings.binding_of(node), binding_of(&tree, node), "{:?}", tree.range(node));
             }

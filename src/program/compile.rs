@@ -204,9 +204,9 @@ mod tests {
 
     #[test]
     fn a_failure_in_a_macro_is_located_in_the_call_and_in_the_macro() {
-        let text = "(defmacro twice (form)\n  (list 'progn form\n        (car 'form)))\n\
+        let text = "(defmacro twice (form)\n  (list 'progn form\n        (car (identity 'form))))\n\
                     (twice (print 1))\n(dotimes\n    (5 3)\n  (print 1))\n\
-                    (eval-when (:compile-toplevel)\n  (car 'table))";
+                    (eval-when (:compile-toplevel)\n  (car (identity 'table)))";
         let compiled = compile(&[Source::new("a.esl", text)]);
         let part = |span: Span| &text[span.start as usize..span.end as usize];
         let places: Vec<Vec<&str>> = compiled
@@ -217,7 +217,10 @@ mod tests {
                 labels.map(|label| part(label.span)).collect()
             })
             .collect();
-        assert_eq!(places, [vec!["twice", "(car 'form)"], vec!["5"], vec!["(car 'table)"]]);
+        assert_eq!(
+            places,
+            [vec!["twice", "(car (identity 'form))"], vec!["5"], vec!["(car (identity 'table))"]]
+        );
     }
 
     #[test]

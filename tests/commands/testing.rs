@@ -131,11 +131,11 @@ fn without_a_test_nothing_has_passed() {
 fn tests_are_found_in_folders() {
     let passing = |name: &str| format!("(deftest {name} (is t))");
     let folder = Folder::new("testing-folders");
-    folder.file("drive_test.esl", &passing("driving"));
-    folder.file("arm-test.esl", &passing("reaching"));
+    folder.file("drive_test.esl", passing("driving"));
+    folder.file("arm-test.esl", passing("reaching"));
     folder.file("plan.esl", "(deftest never-run (is nil))");
-    folder.file("tests/deep/camera.esl", &passing("looking"));
-    folder.file("target/copy_test.esl", &passing("copied"));
+    folder.file("tests/deep/camera.esl", passing("looking"));
+    folder.file("target/copy_test.esl", passing("copied"));
     let names = ["DRIVING", "REACHING", "LOOKING"];
     for arguments in [&[][..], &["."], &["drive_test.esl", "."]] {
         let (status, output, errors) = test_with_errors(&folder, arguments);
@@ -177,7 +177,7 @@ fn a_test_says_at_which_grain_it_was_explored() {
         )
     };
     let said = |how: &str, place: &str| {
-        folder.file("count.esl", &text(how, place));
+        folder.file("count.esl", text(how, place));
         let (status, output) = test(&folder, &["count.esl"]);
         (status, output.lines().nth(1).unwrap_or_default().to_string())
     };
@@ -226,7 +226,7 @@ fn options_that_a_test_does_not_have_are_refused() {
         (":seeds 2 :explore t", "takes :SEEDS or :EXPLORE"),
         (":seeds 2 :seeds 3", "has :SEEDS twice"),
     ] {
-        folder.file("options.esl", &format!("(deftest odd {options} (is t))"));
+        folder.file("options.esl", format!("(deftest odd {options} (is t))"));
         let (status, output, errors) = test_with_errors(&folder, &["options.esl"]);
         assert_eq!((status, &*output), (Some(3), ""), "{options}: {errors}");
         assert!(errors.contains(said), "{options}: {errors}");

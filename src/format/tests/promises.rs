@@ -33,8 +33,9 @@ fn programs() -> Vec<PathBuf> {
 #[track_caller]
 fn check_promises(text: &str, styles: &Styles, path: &Path) {
     let tree = SyntaxTree::new(text);
-    let is_readable = structure_faults(Default::default(), text).is_empty();
-    let once = match format(&tree, styles, None) {
+    let formatted = format(&tree, styles, None);
+    let is_readable = formatted.is_ok();
+    let once = match formatted {
         Ok(once) => once,
         Err(FormatError::Unreadable) => Edit::apply(text, &indent_edits(&tree, styles, None)),
         Err(FormatError::Changed) => panic!("{}: {text}", path.display()),
