@@ -104,6 +104,8 @@ impl std::fmt::Debug for ServedRun {
 
 /// Time that viewers and operators have to hear how a run has ended.
 const FAREWELL: Duration = Duration::from_secs(1);
+/// Time that answers have that the run has given before its end, to be on their way before that is told.
+const ANSWERS: Duration = Duration::from_millis(200);
 
 impl ServedRun {
     /// Tells viewers of the monitor and attached operators how the run of a machine has ended, with this exit
@@ -125,18 +127,26 @@ impl ServedRun {
                 machine.survey(&request),
             );
         });
-        let told_sessions = self.sessions.as_ref().map(|sessions| sessions.end(&said));
+        let told_sessions = self.sessions.as_ref().map(|sessions| {
+            machine.inbox().end_questions();
+            wait_until(ANSWERS, || sessions.is_answered());
+            sessions.end(&said);
+        });
         if told_monitor.is_none() && told_sessions.is_none() {
             return;
         }
-        let deadline = Instant::now() + FAREWELL;
-        let is_told = || {
+        wait_until(FAREWELL, || {
             self.monitor.as_ref().is_none_or(MonitorHandle::is_told)
                 && self.sessions.as_ref().is_none_or(SessionsHandle::is_told)
-        };
-        while !is_told() && Instant::now() < deadline {
-            std::thread::sleep(Duration::from_millis(5));
-        }
+        });
+    }
+}
+
+/// Waits until a condition is true, or the time is over.
+fn wait_until(time: Duration, holds: impl Fn() -> bool) {
+    let deadline = Instant::now() + time;
+    while !holds() && Instant::now() < deadline {
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 

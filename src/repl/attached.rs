@@ -4,6 +4,7 @@ use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use esl_vm::host::{Inbox, Incoming, Rights};
 
@@ -21,6 +22,9 @@ use crate::operate::attach::{self, WireForm};
 pub(super) const SECRET: &str = "ESL_SECRET";
 /// Name of the role that may evaluate.
 const PATCH: &str = "patch";
+
+/// Time that the reason has to be heard for which the connection has ended.
+const HEARING: Duration = Duration::from_secs(1);
 
 /// The commands.
 const COMMANDS: &[SessionCommand] = &[
@@ -344,6 +348,9 @@ impl Attached {
 
     /// Returns the exit status at the end of the lines, or of the run.
     fn end(&mut self) -> u8 {
+        if self.end.reason().is_some() {
+            return self.ended();
+        }
         match self.send("swank:connection-info", &[]) {
             Ok(_) => SUCCESS,
             Err(Disconnected) => self.ended(),
@@ -352,6 +359,8 @@ impl Attached {
 
     /// Says that the run has ended, and returns the exit status.
     fn ended(&self) -> u8 {
+        // A request that cannot be written any more is noticed before what was written last is heard.
+        while self.answers.recv_timeout(HEARING).is_ok() {}
         self.typing.leave();
         complain(self.end.reason().unwrap_or_else(|| "the run has ended".into()));
         FAILED

@@ -11,7 +11,7 @@ use rustix::termios::{Termios, tcgetattr};
 
 use crate::eslvm;
 use crate::folder::Folder;
-use crate::operate::Operated;
+use crate::operate::{Operated, until};
 
 /// Output of a session, as it comes.
 struct Output {
@@ -86,6 +86,16 @@ impl Session {
     }
 }
 
+/// Waits until a session has ended, and returns its exit status.
+fn status(child: &mut Child) -> Option<i32> {
+    let mut ended = None;
+    until("the end of the session", || {
+        ended = child.try_wait().expect("it can be asked");
+        ended.is_some()
+    });
+    ended.and_then(|status| status.code())
+}
+
 /// It does so while the next line is edited, and leaves the terminal as it was.
 #[test]
 fn a_task_ends_the_session_at_once() {
@@ -95,8 +105,7 @@ fn a_task_ends_the_session_at_once() {
         "(progn (spawn (sleep 0.2) (unwind-protect (exit 7) (print (list 'cleaned 'up)))) (list 'go))\r";
     person.write_all(form.as_bytes()).expect("it is read");
     output.await_text("(GO)");
-    let status = child.wait().expect("it ends");
-    assert_eq!(status.code(), Some(7));
+    assert_eq!(status(&mut child), Some(7));
     output.await_text("(CLEANED UP)");
     let after = tcgetattr(&terminal).expect("it is still a terminal");
     assert_eq!((after.local_modes, after.input_modes), (before.local_modes, before.input_modes));
@@ -113,7 +122,7 @@ fn what_is_typed_ahead_is_kept() {
         output.await_text(&format!("(FORM {n})"));
     }
     person.write_all(b"(exit 3)\r").expect("it is read");
-    assert_eq!(child.wait().expect("it ends").code(), Some(3));
+    assert_eq!(status(&mut child), Some(3));
 }
 
 /// TAB lists the names that a word can become, with what there is to say about them, and completes it when
@@ -139,7 +148,7 @@ fn a_word_is_completed() {
     write("help\r");
     output.await_text(":load FILE");
     write("exit\r");
-    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+    assert_eq!(status(&mut child), Some(0));
 }
 
 #[test]
@@ -156,17 +165,19 @@ fn sessions_elsewhere_are_edited_too() {
     output.await_text("(7)");
     person.write_all(b":undo\t\r").expect("it is read");
     output.await_text("; there is no patch to be undone");
-    // Ctrl-D.
+    // Before the next line is asked for, the terminal itself takes Ctrl-D for the end of an empty input.
+    output.await_text("? ");
     person.write_all(b"\x04").expect("it is read");
-    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+    assert_eq!(status(&mut child), Some(0));
     assert_eq!(run.end(), Some(0));
     let Session { mut person, mut child, mut output, .. } =
         Session::of(&["replay", "--until", "tick:0", &recording]);
     output.await_text("(replay) ");
     person.write_all(b"whe\t\r").expect("it is read");
-    output.await_text("tick 0");
+    output.await_text(": between two turns");
     person.write_all(b"stpe\r").expect("it is read");
     output.await_text("There is no command `stpe`; did you mean `step`?");
+    output.await_text("(replay) ");
     person.write_all(b"\x04").expect("it is read");
-    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+    assert_eq!(status(&mut child), Some(0));
 }

@@ -104,6 +104,11 @@ impl SessionsHandle {
         self.0.tell_end(&packet);
     }
 
+    /// Returns whether all requests have been answered.
+    pub(super) fn is_answered(&self) -> bool {
+        self.0.are_answered()
+    }
+
     /// Returns whether all packets have been taken.
     pub(super) fn is_told(&self) -> bool {
         self.0.are_empty()
@@ -357,7 +362,6 @@ async fn take_requests(
     session: &Arc<OperatorSession>,
     outbox: &Outbox,
 ) -> io::Result<()> {
-    let room = Arc::new(Semaphore::new(UNDER_WAY));
     loop {
         let text = tokio::select! {
             text = packet::read_in_time(reader, LARGEST, PATIENCE) => text?,
@@ -380,7 +384,7 @@ async fn take_requests(
                 {
                     outbox.note_hears_end();
                 }
-                let Ok(permit) = room.clone().try_acquire_owned() else {
+                let Some(permit) = outbox.begin_request() else {
                     let refusal = answer(Err(OperatorRefusal::TooManyRequests), number);
                     _ = outbox.send(&refusal).await;
                     continue;
@@ -388,7 +392,10 @@ async fn take_requests(
                 let (session, outbox) = (session.clone(), outbox.clone());
                 tokio::spawn(async move {
                     let result = session.perform(&form, &package, &thread).await;
-                    _ = outbox.send(&answer(result, number)).await;
+                    // How the run has ended is the answer for who is told that.
+                    if !(matches!(result, Err(OperatorRefusal::Ended)) && outbox.hears_end()) {
+                        _ = outbox.send(&answer(result, number)).await;
+                    }
                     drop(permit);
                 });
             }

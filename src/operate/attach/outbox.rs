@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
 use super::form::WireForm;
-use super::packet;
+use super::{UNDER_WAY, packet};
 
 /// Bytes of packets on their way to a peer, but for one packet that is longer.
 const ROOM: usize = 256 << 10;
@@ -30,6 +30,8 @@ pub(super) struct Outbox {
     packets: mpsc::UnboundedSender<OutgoingPacket>,
     /// Whether the peer wants to hear how the run ends.
     hears_end: Arc<AtomicBool>,
+    /// Room for requests under way.
+    requests: Arc<Semaphore>,
     room: Arc<Semaphore>,
     reserve: Arc<Semaphore>,
 }
@@ -49,8 +51,18 @@ impl Outbox {
     /// Returns an outbox, and what takes its packets.
     pub(super) fn new() -> (Outbox, mpsc::UnboundedReceiver<OutgoingPacket>) {
         let (packets, taken) = mpsc::unbounded_channel();
-        let [room, reserve] = [ROOM, RESERVE].map(|bytes| Arc::new(Semaphore::new(bytes)));
-        (Outbox { packets, hears_end: Arc::default(), room, reserve }, taken)
+        let [requests, room, reserve] = [UNDER_WAY, ROOM, RESERVE].map(|most| Arc::new(Semaphore::new(most)));
+        (Outbox { packets, hears_end: Arc::default(), requests, room, reserve }, taken)
+    }
+
+    /// Takes room for a request that is under way, if there is any.
+    pub(super) fn begin_request(&self) -> Option<OwnedSemaphorePermit> {
+        self.requests.clone().try_acquire_owned().ok()
+    }
+
+    /// Returns whether the peer wants to hear how the run ends.
+    pub(super) fn hears_end(&self) -> bool {
+        self.hears_end.load(Ordering::Relaxed)
     }
 
     /// Notes that the peer wants to hear how the run ends.
@@ -106,8 +118,13 @@ impl Outboxes {
     /// Tells those who want to hear it how the run has ended.
     pub(super) fn tell_end(&self, packet: &WireForm) {
         let table = self.table();
-        let told = table.values().filter(|outbox| outbox.hears_end.load(Ordering::Relaxed));
+        let told = table.values().filter(|outbox| outbox.hears_end());
         told.for_each(|outbox| outbox.send_at_once(packet));
+    }
+
+    /// Returns whether no requests are under way.
+    pub(super) fn are_answered(&self) -> bool {
+        self.table().values().all(|outbox| outbox.requests.available_permits() == UNDER_WAY)
     }
 
     /// Returns whether no packets are on their way.

@@ -115,7 +115,7 @@ pub enum Answer {
     Aborted,
     /// The tasks that have not ended, in the order in which they were made.
     Tasks(Vec<TaskInfo>),
-    /// The machine is gone.
+    /// The machine is gone, or the run has ended.
     Ended,
 }
 
@@ -174,11 +174,13 @@ impl Inbox {
 
     /// Says that no question will be answered any more.
     pub(crate) fn end_answers(&self) {
-        let slots = {
-            let mut waiting = self.asking().waiting();
-            waiting.is_closed = true;
-            std::mem::take(&mut waiting.slots)
-        };
+        self.asking().waiting().is_closed = true;
+        self.end_questions();
+    }
+
+    /// Says that none of the questions so far will be answered any more, since the run has ended.
+    pub fn end_questions(&self) {
+        let slots = std::mem::take(&mut self.asking().waiting().slots);
         slots.into_values().for_each(|slot| slot.fill(Answer::Ended));
     }
 }

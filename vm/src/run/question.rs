@@ -25,7 +25,9 @@ pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
             vm.outside.inbox.answer(number, Answer::Tasks(tasks));
         }
         // What ends begins nothing new.
-        Question::Call { .. } if vm.embedder.is_ending => vm.outside.inbox.answer(number, Answer::Ended),
+        Question::Call { .. } if vm.embedder.is_ending || all_are_to_end(vm) => {
+            vm.outside.inbox.answer(number, Answer::Ended);
+        }
         Question::Call { function, arguments, goes_first } => {
             let Some(id) = begin_call(vm, &function, &arguments, goes_first) else {
                 return vm.outside.inbox.answer(number, no_call(&function));
@@ -37,6 +39,12 @@ pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
             }
         }
     }
+}
+
+/// Returns whether all tasks of a program have been asked to end. Each that ends has those asked that were
+/// made since; after the last one nobody does.
+fn all_are_to_end(vm: &Vm) -> bool {
+    vm.scheduler.main.is_some() && vm.scheduler.counts.made_at_end > 0
 }
 
 fn no_call(function: &FunctionRef) -> Answer {
@@ -159,6 +167,7 @@ pub(super) fn answer_call(vm: &mut Vm, end: TaskEnd, values: &[Value]) -> bool {
                 (report::cause_label(&vm.heap, condition), report::failure_arguments(vm, condition));
             Answer::Failed { cause, message, report, arguments, frames }
         }
+        TaskEnd::Aborted if all_are_to_end(vm) => Answer::Ended,
         TaskEnd::Aborted | TaskEnd::Spent => Answer::Aborted,
     };
     vm.outside.inbox.answer(number, answer);
