@@ -6,8 +6,8 @@ use esl_compiler::reader::{BareEnvironment, Reader, print};
 use super::FormatError;
 use crate::syntax::{SyntaxKind, SyntaxTree};
 
-/// Checks that two texts have the same tokens and comments in the same lists, and that the reader reads the same
-/// data of both.
+/// Checks that two texts have the same tokens and comments in the same lists, and that the reader reads the
+/// same data of both.
 ///
 /// # Errors
 /// [`FormatError`]: `Unreadable` if the reader refuses the first text where they differ.
@@ -43,8 +43,11 @@ fn check_same_data(before: &str, after: &str) -> Result<(), FormatError> {
             }
             // What the reader refuses of both, such as the name of a package that is not there.
             (Some(Err(one)), Some(Err(other))) if one.code == other.code => {}
-            // The notation of another language depends on blanks: `f(x)`.
             (Some(Err(_)), _) => return Err(FormatError::Unreadable),
+            // The reader tells other languages by blanks and lines: `f(x)`, `for (…)` on one line.
+            (_, Some(Err(fault))) if fault.code.starts_with("foreign-") => {
+                return Err(FormatError::Unreadable);
+            }
             _ => return Err(FormatError::Changed),
         }
     }
