@@ -49,7 +49,7 @@ fn files(folder: &str, extension: &str) -> Vec<PathBuf> {
 /// Compiles a text that stands in `path`; returns what is reported and not meant.
 fn findings(path: &Path, text: String) -> Vec<String> {
     let name = path.strip_prefix(root()).unwrap_or(path).display().to_string();
-    let modules = ModulePath::new([path].into_iter(), &[]);
+    let modules = ModulePath::new([path], &[]);
     let compiled = program::compile_with(&[Source::new(name.clone(), text)], &modules, Modules::Inside);
     let mut meant: Vec<(&str, usize)> =
         MEANT.iter().filter(|(file, ..)| *file == name).map(|&(_, code, count)| (code, count)).collect();

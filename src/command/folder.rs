@@ -73,7 +73,7 @@ mod tests {
         let others = ["contest.esl", "latest/drive.esl", "main.esl", "test/drive.esl"];
         let is_test = |file: &&str| is_test_file(Path::new("."), Path::new(file));
         assert!(tests.iter().all(is_test));
-        assert!(!others.iter().any(|file| is_test(file)));
+        assert!(!others.iter().any(is_test));
         // A folder around the one that is searched does not count.
         assert!(!is_test_file(Path::new("tests/plan"), Path::new("tests/plan/drive.esl")));
     }
