@@ -4,9 +4,6 @@ use std::collections::HashMap;
 
 use crate::syntax::{LineStarts, NodeId, SyntaxTree};
 
-/// Characters of a form that are shown.
-const SHOWN: usize = 60;
-
 /// Sources by name; `None` for one that cannot be read.
 #[derive(Default)]
 pub(super) struct SourceForms(HashMap<String, Option<(SyntaxTree, LineStarts)>>);
@@ -32,6 +29,13 @@ impl SourceForms {
         let form = self.form(source, line, column);
         form.and_then(|(tree, node)| tree.operator(node)).is_some_and(|found| found == operator)
     }
+}
+
+/// For the commands, which show findings.
+#[cfg(feature = "cli")]
+impl SourceForms {
+    /// Characters of a form that are shown.
+    const SHOWN: usize = 60;
 
     /// Returns a place, as `file:line:column`, with the form that begins there, in one line.
     pub(super) fn describe(&mut self, place: &str) -> String {
@@ -49,7 +53,7 @@ impl SourceForms {
         let (tree, node) = self.form(parts.next()?, line, column)?;
         let words: Vec<&str> = tree.text(node).split_whitespace().collect();
         let text = words.join(" ");
-        Some(match text.char_indices().nth(SHOWN) {
+        Some(match text.char_indices().nth(Self::SHOWN) {
             Some((end, _)) => format!("{}…", text[..end].trim_end()),
             None => text,
         })

@@ -41,13 +41,13 @@ fn check_same_data(before: &str, after: &str) -> Result<(), FormatError> {
                     return Err(FormatError::Changed);
                 }
             }
+            // The reader tells other languages by blanks and lines: `f(x)`, `for (…)` on one line.
+            (Some(Err(fault)), _) | (_, Some(Err(fault))) if fault.code.starts_with("foreign-") => {
+                return Err(FormatError::Unreadable);
+            }
             // What the reader refuses of both, such as the name of a package that is not there.
             (Some(Err(one)), Some(Err(other))) if one.code == other.code => {}
             (Some(Err(_)), _) => return Err(FormatError::Unreadable),
-            // The reader tells other languages by blanks and lines: `f(x)`, `for (…)` on one line.
-            (_, Some(Err(fault))) if fault.code.starts_with("foreign-") => {
-                return Err(FormatError::Unreadable);
-            }
             _ => return Err(FormatError::Changed),
         }
     }
