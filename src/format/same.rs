@@ -1,5 +1,6 @@
 //! The guarantee of the formatter: what the reader reads of a text stays the same, and so do its comments.
 
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::package::Qualifier;
 use esl_compiler::reader::{BareEnvironment, Reader, print};
 
@@ -31,24 +32,29 @@ fn essence(tree: &SyntaxTree, node: u32) -> (SyntaxKind, Option<u32>, &str) {
 fn check_same_data(before: &str, after: &str) -> Result<(), FormatError> {
     let mut environments = (BareEnvironment::new(), BareEnvironment::new());
     let mut readers = (Reader::new(Default::default(), before), Reader::new(Default::default(), after));
+    // The reader tells the notations of other languages, such as `f(x)`, by blanks and lines. How it reads
+    // the rest of such a text depends on them too.
+    let is_foreign = |fault: &Diagnostic| fault.code.starts_with("foreign-");
+    let mut fault_of_difference = FormatError::Changed;
     loop {
         let read = (readers.0.next(&mut environments.0), readers.1.next(&mut environments.1));
+        if let (Some(Err(fault)), _) | (_, Some(Err(fault))) = &read
+            && is_foreign(fault)
+        {
+            fault_of_difference = FormatError::Unreadable;
+        }
         match read {
             (None, None) => return Ok(()),
             (Some(Ok(one)), Some(Ok(other))) => {
                 let [one, other] = [one, other].map(|datum| print(&datum, &|_| Qualifier::None));
                 if one != other {
-                    return Err(FormatError::Changed);
+                    return Err(fault_of_difference);
                 }
-            }
-            // The reader tells other languages by blanks and lines: `f(x)`, `for (…)` on one line.
-            (Some(Err(fault)), _) | (_, Some(Err(fault))) if fault.code.starts_with("foreign-") => {
-                return Err(FormatError::Unreadable);
             }
             // What the reader refuses of both, such as the name of a package that is not there.
             (Some(Err(one)), Some(Err(other))) if one.code == other.code => {}
             (Some(Err(_)), _) => return Err(FormatError::Unreadable),
-            _ => return Err(FormatError::Changed),
+            _ => return Err(fault_of_difference),
         }
     }
 }
