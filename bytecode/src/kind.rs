@@ -8,7 +8,7 @@
 
 use crate::datum::DatumKind;
 
-/// What a parameter takes.
+/// Kind of argument that a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArgumentKind {
     /// A number.

@@ -1,4 +1,4 @@
-//! What the compiler asks about a name: similar names for a use of it, and the parameters of a function.
+//! Answers to the compiler about a name: similar names for a use of it, and the parameters of a function.
 
 use crate::datum::Datum;
 use crate::symbol::Symbol;

@@ -75,7 +75,7 @@ impl Expander {
         origin: Option<OriginId>,
     ) {
         let Some(check) = CHECKS.get(&form.operator) else { return };
-        // What a macro of the program makes may handle the failures of forms inside its call.
+        // The expansion of a macro of the program may handle the failures of forms inside its call.
         if is_known(self.origins.written(form.span, origin)) || !self.origins.is_of_library(form.span, origin)
         {
             check(self, environment, form, origin);

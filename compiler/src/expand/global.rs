@@ -124,7 +124,7 @@ impl GlobalUses {
                 if known.as_ref().is_some_and(|known| known.arity != arity) {
                     *known = None;
                 } else if let Some(known) = known {
-                    // Which of the definitions holds when a call is made is unknown.
+                    // The definition in force at the time of a call is unknown.
                     known.keys = None;
                 }
             })

@@ -28,7 +28,7 @@ pub struct UnitFindings {
     pub foreign: Vec<Span>,
 }
 
-/// What is known of the parameters of a function.
+/// Known parameters of a function.
 #[derive(Clone, Debug)]
 struct KnownFunction {
     arity: Option<Arity>,
