@@ -74,7 +74,7 @@ fn anchors(text: &str) -> BTreeSet<String> {
 fn links(text: &str) -> Vec<&str> {
     let mut found = Vec::new();
     for line in prose(text) {
-        // What is in backticks is no link.
+        // Text in backticks is not a link.
         for part in line.split('`').step_by(2) {
             found.extend(
                 part.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(link, _)| link),

@@ -1,4 +1,4 @@
-//! The examples of the manual, of the cookbook, of the pages for those who come from another language, and of
+//! The examples of the manual, of the cookbook, of the pages for users of other languages, and of
 //! `README.md`, run by the commands; `conformance/src/chapter.rs` describes their form.
 
 use std::path::Path;

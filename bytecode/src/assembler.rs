@@ -23,11 +23,11 @@ use crate::operand::*;
 pub struct AssembleError {
     /// The line, from 1.
     pub line: usize,
-    /// What is wrong with it.
+    /// The fault in it.
     pub fault: AssembleFault,
 }
 
-/// What is wrong with a line. Words are as the text has them.
+/// A fault in a line. Words are spelt as in the text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AssembleFault {
     /// No opcode has this mnemonic.
@@ -36,7 +36,7 @@ pub enum AssembleFault {
     MissingOperand,
     /// The number after `want` is missing.
     MissingNumber,
-    /// The word is no operand, and no label.
+    /// The word is neither an operand nor a label.
     NotAnOperand(String),
     /// The number is too large for its field.
     TooLarge(String),

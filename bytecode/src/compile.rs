@@ -1,6 +1,6 @@
-//! What compiler and virtual machine are to each other. Neither names the other: the compiler asks an
-//! [`Environment`] what names mean and drives a [`CompileTimeHost`] that runs macros; the virtual machine is
-//! handed a [`Compile`] for `eval`, `load` and `read`.
+//! The interface between compiler and virtual machine. Neither depends on the other: the compiler looks names
+//! up in an [`Environment`] and drives a [`CompileTimeHost`] that runs macros; the virtual machine receives a
+//! [`Compile`] for `eval`, `load` and `read`.
 //!
 //! A compilation is a machine of steps: it never runs a macro itself but says that one is to be run, and is
 //! told the outcome. So a running program can compile in a task that is preempted and aborted like any other.
@@ -89,9 +89,9 @@ pub enum InternError {
 
 /// Meanings of names while a form is read and compiled. No call of these runs the program.
 pub trait Environment {
-    /// What is known of `symbol`.
+    /// Returns the global meaning of `symbol`.
     fn global(&self, symbol: &Symbol) -> Global;
-    /// What is known of the function `(setf symbol)`.
+    /// Returns the definition of the function `(setf symbol)`.
     fn setf_function(&self, symbol: &Symbol) -> GlobalFunction;
     /// Returns the data that the library recorded about `symbol` under `indicator`, such as the expander of a
     /// `defsetf`.
@@ -123,8 +123,8 @@ pub trait Environment {
     fn fresh(&mut self) -> u32;
     /// Names like `symbol` that are defined for such a use; the likeliest first.
     fn similar(&self, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol>;
-    /// What is known of the parameters of the global function or macro that `cell` keeps; `cell` is its name,
-    /// or [`setf_cell`](crate::symbol::setf_cell) of that.
+    /// Returns the parameters of the global function or macro in `cell`, if they are known; `cell` is its
+    /// name, or [`setf_cell`](crate::symbol::setf_cell) of that.
     fn signature(&self, _cell: &Symbol) -> Option<Signature> {
         None
     }
@@ -368,7 +368,7 @@ pub trait CompileTimeHost: Environment {
     fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, CompileTimeFailure>;
 }
 
-/// Why there is no module of a name, and what to do, in the words of who looks for modules.
+/// Why a module is missing and what to do about it, in the words of the finder of modules.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NoModule(pub String);
 
@@ -405,7 +405,7 @@ pub fn drive(
 /// As [`drive`]; `library` finds the modules that the text requires.
 ///
 /// # Errors
-/// What [`CompileTimeHost::account`] gives.
+/// The errors of [`CompileTimeHost::account`].
 pub fn drive_with(
     compilation: &mut dyn Compilation,
     host: &mut dyn CompileTimeHost,

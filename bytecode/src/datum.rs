@@ -49,8 +49,8 @@ pub enum DatumKind {
     Object(ObjectId),
     /// Something of the embedder's.
     Opaque(OpaqueDatum),
-    /// What a call gives that is made when the text has been read, such as `#.form`: a list of the name of a
-    /// macro of the library and its arguments. The macro returns `(quote datum)`.
+    /// A call that is made once the text has been read and that its value replaces, such as `#.form`: a list
+    /// of the name of a macro of the library and its arguments. The macro returns `(quote datum)`.
     Call(Datum),
 }
 

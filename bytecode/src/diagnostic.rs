@@ -1,4 +1,4 @@
-//! What is wrong with a source text, as data. Codes are listed, and diagnostics drawn, by the compiler.
+//! Diagnostics of a source text, as data. The compiler lists their codes and draws them.
 
 use crate::span::Span;
 

@@ -84,8 +84,8 @@ impl Capture {
     }
 }
 
-/// What a function takes. Arguments arrive in registers: first the required ones, then the optional ones,
-/// then the list of the rest, then one register for each key. A parameter that got no argument holds the
+/// Parameters of a function. Arguments arrive in registers: first the required ones, then the optional ones,
+/// then the list of the rest, then one register for each key. A parameter without an argument holds the
 /// *unsupplied* marker, which `jump-if-supplied` tests for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Parameters {

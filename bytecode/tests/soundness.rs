@@ -14,7 +14,7 @@ use esl_bytecode::operand::{Count, Role, Want, Window};
 use esl_bytecode::verify::verify;
 use support::{Random, build, module_with_random_code};
 
-/// What a register holds.
+/// The contents of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ModelCell {
     /// A link word or a leftover of another frame.
@@ -71,7 +71,7 @@ enum ModelBinding {
     OfList,
 }
 
-/// What comes after an instruction.
+/// The successor of an instruction.
 enum ModelNext {
     Instruction,
     Jump(usize),

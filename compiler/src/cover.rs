@@ -18,11 +18,11 @@ use crate::resolve::{children, children_mut, lambda_nodes};
 pub struct CountedPlace {
     /// Text of the form.
     pub span: Span,
-    /// What a passage means.
+    /// The event that a passage stands for.
     pub kind: PassageKind,
 }
 
-/// What it means that control passes a counted place.
+/// The event for which control passes a counted place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PassageKind {
     /// The form is evaluated.
@@ -36,7 +36,7 @@ pub enum PassageKind {
 /// Largest number of places, which an instruction can name.
 const MOST_PLACES: usize = 1 << 24;
 
-/// What is known of a node from the form around it.
+/// The form around a node, and the role of the node in it.
 #[derive(Clone, Copy)]
 struct Surroundings {
     /// Place of the form around it.

@@ -40,7 +40,8 @@ fn uses(folder: &Path, prefix: &str) -> Uses {
     texts.iter().map(|(name, text)| (name.clone(), named(name, text))).collect()
 }
 
-/// What is left when files that use none of those left are taken away, one after another: the circles.
+/// Returns the circles: the files left over when files that use none of the others are removed, one after
+/// another.
 fn circles(mut left: Uses) -> Uses {
     while let Some(lowest) = left.iter().find(|(_, uses)| uses.is_empty()).map(|(name, _)| name.clone()) {
         left.remove(&lowest);

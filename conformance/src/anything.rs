@@ -87,7 +87,7 @@ pub fn compile_and_run(text: &str) {
                 assert!(run(&module), "a compiled module is loaded");
             }
         }
-        // What a text has left behind must not run among the next.
+        // Tasks left behind by a text must not run among those of the next.
         if is_full || *served >= SERVED || !machine.task_figures().is_empty() {
             *serving = None;
         }
@@ -153,7 +153,7 @@ pub fn run_file(bytes: &[u8]) -> bool {
     }
 }
 
-/// What of a run does not depend on how functions run.
+/// The part of a run that does not depend on how functions run.
 #[cfg(feature = "native")]
 #[derive(Debug, PartialEq)]
 struct TierCourse {

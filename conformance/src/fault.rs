@@ -7,7 +7,7 @@ use std::fmt;
 pub struct WrongLine {
     /// The line, from 1.
     pub line: usize,
-    /// What is wrong with it.
+    /// The fault in it.
     pub fault: LineFault,
 }
 

@@ -23,7 +23,7 @@ pub struct Finished {
     pub errors: String,
 }
 
-/// What a command that ought to be quiet has written to standard error.
+/// Text that a command wrote to standard error although it ought to be quiet.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NotQuiet(pub String);
 

@@ -180,7 +180,7 @@ proptest! {
         }
     }
 
-    /// As the fuzz target does. What a failure needs of the texts before is for those who search.
+    /// As the fuzz target does. A failure may depend on earlier texts of the list.
     #[test]
     #[ignore = "run with --ignored, and PROPTEST_CASES for longer"]
     fn one_machine_serves_many_programs(texts in prop::collection::vec(any::<Index>(), 1..20)) {

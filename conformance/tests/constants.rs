@@ -1,5 +1,5 @@
-//! What the compiler says of constant arguments is true: each builtin refuses, when it is called, each
-//! constant that the kind of its parameter refuses.
+//! Diagnostics of constant arguments are true: each builtin refuses, when it is called, each constant that
+//! the kind of its parameter refuses.
 
 use esl::Config;
 use esl::host::VirtualHost;

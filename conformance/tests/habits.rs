@@ -1,4 +1,4 @@
-//! Programs as people write them who come from another language, each with the one message that it deserves.
+//! Programs as users of other languages write them, each with the one message that it deserves.
 //!
 //! A file of `habits/` has a program for each line that begins with `===`, then, behind a line `---`, all
 //! that the compiler says about it. `ESL_BLESS=1` writes the messages anew; read the difference aloud.

@@ -13,7 +13,7 @@ use proptest::prelude::*;
 const PROGRAMS: [&str; 7] = [
     // Round-robin.
     "(dolist (name '(1 2 3)) (let ((name name)) (spawn (dotimes (i 40) (dotimes (j 40) (car '(1))) (princ name)))))",
-    // What tasks can learn of their own ticks.
+    // Tasks that read their own ticks.
     "(dotimes (i 3) (spawn (dotimes (j 200) (princ (esl::%task-ticks (current-task))) (dotimes (k j) (list k)))))",
     // Budgets of forms inside and outside of each other, and tasks made under them.
     "(dotimes (i 4)
@@ -145,7 +145,7 @@ fn addresses_change_nothing() {
     }
 }
 
-/// Whoever looks at a run, as the monitor and the metrics do, is no part of it.
+/// Surveys, as the monitor and the metrics use them, change nothing in a run.
 #[test]
 fn looking_changes_nothing() {
     use esl::host::{Look, SurveyRequest};
@@ -189,7 +189,7 @@ fn looking_changes_nothing() {
     }
 }
 
-/// What can be told of a run between two portions.
+/// Returns the observable state of a run between two portions.
 fn present(machine: &Vm, captured: &Captured) -> (u64, u64, u128, String) {
     (machine.ticks(), machine.canary(), machine.fingerprint(), captured.output())
 }

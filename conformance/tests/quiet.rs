@@ -1,5 +1,5 @@
-//! Programs that are right have no warning: the examples, the modules, the cookbook, the tutorial and the
-//! pages for those who come from other languages.
+//! Correct programs have no warning: the examples, the modules, the cookbook, the tutorial and the pages for
+//! users of other languages.
 //!
 //! Some chapters show mistakes on purpose. `MEANT` lists what they show.
 

@@ -25,7 +25,7 @@ impl Drop for Removed {
     }
 }
 
-/// Returns the programs that compile, and read nothing that somebody types: nobody does.
+/// Returns the programs that compile and read no typed input, since there is none.
 fn silent_programs() -> impl Iterator<Item = (PathBuf, Program)> {
     programs::paths("").into_iter().filter_map(|path| {
         let text = std::fs::read_to_string(&path).expect("a program can be read");
@@ -44,7 +44,8 @@ fn programs_take_the_same_course_when_they_are_replayed() {
     let file = Removed(file);
     let (mut run, mut checks, mut interrupted) = (0, 0, 0);
     for (index, (path, program)) in silent_programs().enumerate() {
-        // What is slept in these programs is hours; what loops is to end soon.
+        // These programs sleep for hours, hence the speed; their endless loops must end soon, hence the
+        // budget.
         let config =
             Config { budget: Some(1_000_000), memory: 64 << 20, seed: index as u64, ..Config::DEFAULT };
         let setup = RunSetup { config, ..RunSetup::default() };

@@ -4,12 +4,12 @@
 
 /// Address of an instruction in code or in a stub, or no address.
 ///
-/// Anybody may store and compare saved addresses. To follow one is unsafe, and up to whoever runs the code.
+/// Safe code may store and compare saved addresses. Following one is unsafe, and left to the interpreter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SavedPc(*const u32);
 
-// SAFETY: a saved address gives no access to what is there: to follow it is unsafe, and whoever does so shows
-// that the code belongs to the machine in hand.
+// SAFETY: a saved address gives no access to the code there: following it is unsafe, and the unsafe block
+// that does so shows that the code belongs to the machine in hand.
 unsafe impl Send for SavedPc {}
 
 impl SavedPc {

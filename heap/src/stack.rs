@@ -1,7 +1,8 @@
 //! The register stack of one task: a growable segment of words.
 //!
 //! ```text
-//! | callee | return pc | registers of the first frame ... | callee | return pc | registers ... |   unused, nil   |
+//! | callee | return pc | registers of the first frame ... | callee | return pc | registers ... |   unused,
+//! nil   |
 //!                      ^ base of the first frame                               ^ base of the running frame
 //! ```
 //!
@@ -152,7 +153,7 @@ impl Clone for Stack {
             return Stack::none();
         }
         let start = allocate(words);
-        // SAFETY: both segments have so many words, all initialised, and the new one is nobody else's.
+        // SAFETY: both segments have so many words, all initialised, and the new one has no other owner.
         unsafe { start.copy_from_nonoverlapping(self.start, words) };
         Stack { start, ..*self }
     }

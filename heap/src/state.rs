@@ -63,7 +63,7 @@ impl<T: Listed + ?Sized> Listed for Box<T> {
     const FIELDS: &'static [Field] = T::FIELDS;
 }
 
-/// Whoever is told the state of a run.
+/// A consumer of the state of a run, word by word.
 pub trait StateSink {
     /// Takes a word that means the same in every process.
     fn word(&mut self, word: u64);

@@ -18,13 +18,13 @@ fn n(i: i32) -> Value {
 fn code(heap: &mut Heap, constants: &[Value], words: &[u32]) -> Value {
     let (name, debug, owner) = (n(1), n(2), n(3));
     let parts = CodeParts { name, debug, owner, arity: 2, nregs: 5, spare: [7, 8], constants, words };
-    // SAFETY: nobody runs this code.
+    // SAFETY: this code is not run.
     unsafe { heap.alloc_code(parts) }.unwrap()
 }
 
 fn function(heap: &mut Heap) -> Value {
     let code = code(heap, &[], &[0]);
-    // SAFETY: nobody runs the code of this function.
+    // SAFETY: the code of this function is not run.
     unsafe { heap.alloc_function(code, &[n(10), n(11)]) }.unwrap()
 }
 
@@ -162,7 +162,7 @@ fn what_the_interpreter_trusts_cannot_be_overwritten() {
     let f = function(&mut heap);
     assert_eq!(heap.slots_mut::<1>(f, Kind::Function), None);
     assert_eq!(heap.record_set(f, Kind::Function, 0, n(1)), None);
-    // SAFETY: nobody runs the code of this function.
+    // SAFETY: the code of this function is not run.
     let mut set_capture = |index| unsafe { heap.function_set_capture(f, index, n(1)) };
     assert_eq!((set_capture(1), set_capture(2)), (Some(()), None));
     assert_eq!(heap.function_captures(f), Some(&[n(10), n(1)][..]));

@@ -19,7 +19,7 @@ fn collect(heap: &mut Heap, roots: &[Value]) {
     heap.check().unwrap();
 }
 
-/// What a VM does at a tick. One root: `root`.
+/// Does the work of a VM at a tick, with `root` as the only root.
 fn tick(heap: &mut Heap, root: Value) {
     if !heap.gc_due() {
         return;
@@ -153,7 +153,7 @@ fn memory_goes_back_to_the_system() {
     collect(&mut heap, &[vector]);
     assert_eq!(heap.stats().committed, full.committed);
     collect(&mut heap, &[]);
-    // What will be filled before the next cycle stays, and an arena on either side of it.
+    // The memory that will be filled before the next cycle stays, and an arena on either side of it.
     let kept = HeapConfig::default().cycle_floor + (2 << 20);
     assert!(heap.stats().committed as usize <= kept, "{:?}", heap.stats());
     assert_eq!(heap.stats().peak, full.peak);

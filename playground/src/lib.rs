@@ -49,7 +49,7 @@ pub const EXAMPLES: [(&str, &str); 10] = [
     ("Without an end", include_str!("../examples/endless.esl")),
 ];
 
-/// What a page can ask for: compiling a program, running it step by step, its picture.
+/// Requests of a page: compiling a program, running it step by step, drawing its picture.
 #[derive(Default)]
 pub struct Playground {
     run: Option<ShownRun>,

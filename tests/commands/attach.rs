@@ -1,4 +1,4 @@
-//! Operators who are attached to a run.
+//! Operators attached to a run.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -287,7 +287,7 @@ fn each_role_may_do_what_its_secret_says() {
     assert_eq!(run.finish().output, "(3 CALM NIL)\n");
 }
 
-/// Names that are sent are texts: only what somebody evaluates makes symbols in the program.
+/// Names that are sent are texts: only evaluated forms make symbols in the program.
 #[test]
 fn what_strangers_send_makes_no_symbols() {
     let folder = Folder::new("attach_symbols");
@@ -315,7 +315,7 @@ fn what_strangers_send_makes_no_symbols() {
     assert_eq!(run.finish().output, "(3 CALM NIL)\n");
 }
 
-/// What a session does is part of the run, and is there again in a replay; who only looks is not.
+/// Evaluations of a session are part of the run, and happen again in a replay; surveys are not.
 #[test]
 fn a_run_with_sessions_is_replayed_without_them() {
     let folder = Folder::new("attach_recorded");
@@ -411,7 +411,7 @@ fn noise_has_no_effect() {
     let mut dice = Dice(15);
     for round in 0..connections() {
         let mut stream = TcpStream::connect(&address).expect("the run listens");
-        // Some who send it may look; nobody may do anything.
+        // Some connections may survey the run; none may change it.
         let mut bytes = if dice.below(3) > 0 { packet("\"observe-0123456789\"") } else { Vec::new() };
         bytes.extend(noise(&mut dice));
         drop(stream.write_all(&bytes));

@@ -1,4 +1,4 @@
-//! Peers who take places and memory of a run: others are served, and the agent goes on.
+//! Peers that take connections and memory of a run: others are served, and the agent goes on.
 
 use std::io::{BufReader, Read, Write};
 use std::net::TcpStream;

@@ -1,4 +1,4 @@
-//! What `eslc` does for authors: formatting, completions and manual pages, new projects.
+//! Commands of `eslc` for authors: formatting, completions and manual pages, new projects.
 
 use esl_conformance::process::run;
 

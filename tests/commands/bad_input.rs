@@ -112,7 +112,7 @@ fn files_that_cannot_be_read() {
     {
         use std::os::unix::fs::PermissionsExt;
         std::fs::set_permissions(&source, std::fs::Permissions::from_mode(0o000)).expect("it is our file");
-        // Whoever may read everything is not kept from it.
+        // A superuser may read it nevertheless.
         if std::fs::read(&source).is_err() {
             check(&run(&mut eslvm(&["run", &source]), b""), 2, "permission denied");
         }

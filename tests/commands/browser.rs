@@ -17,7 +17,7 @@ pub(crate) struct Browser {
     from: BufReader<ChildStdout>,
     asked: u64,
     page: String,
-    /// What went wrong in the page.
+    /// Errors and exceptions in the page.
     pub(crate) complaints: Vec<Value>,
 }
 
@@ -138,7 +138,7 @@ fn the_page_shows_a_run_and_commands_it() {
     browser.value("location.hash = address('', true), true");
     browser.until("last.matching === 5003");
     browser.until("document.getElementById('t-failures').textContent.includes(':SLIP')");
-    // What the program calls itself is text.
+    // Names in the program are text, even if they look like HTML.
     browser.until("document.querySelectorAll('img, b b').length === 0 && document.querySelectorAll('.row').length < 130");
     browser.value("document.getElementById('scroll').scrollTop = 1e9, true");
     browser.until("last.from > 4800 && last.rows.at(-1).name === 'task IDLER'");
@@ -200,7 +200,7 @@ fn the_page_is_readable_at_any_width_and_keeps_the_end_of_the_run() {
     let address = run.said("; monitor, to command: ");
     browser.ask("Page.navigate", json!({ "url": address }));
     browser.until("last !== null && last.rows.some(row => row.count === 200)");
-    // What was recovered from is not red, and failures that are alike have one card.
+    // Recovered failures are not red, and equal failures share one card.
     browser.until("last.failed === 5 && !document.getElementById('f-failed-box').classList.contains('bad')");
     browser.until("document.querySelectorAll('#t-failures .card').length === 1");
     browser.until("document.querySelector('.card').textContent.includes(':WHEEL-STUCK')");

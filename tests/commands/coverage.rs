@@ -82,7 +82,7 @@ fn coverage_counts_lines_functions_and_arms_and_leaves_the_run_as_it_is() {
         lines_of("drive.esl", "BRDA:"),
         "10,0,0,2 10,0,1,2 13,1,0,0 13,1,1,1 13,1,2,1 19,2,0,2 19,2,1,0 26,3,0,0 26,3,1,1"
     );
-    // What macros run while the program is compiled counts.
+    // Code that macros run at compile time counts.
     assert_eq!(lines_of("gear.esl", "DA:"), "1,1 2,1 3,1 4,0 5,2 6,2");
     assert_eq!(lines_of("gear.esl", "BRDA:"), "2,0,0,1 2,0,1,0 6,1,0,2 6,1,1,0");
     for line in [

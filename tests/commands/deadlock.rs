@@ -53,7 +53,7 @@ fn every_task_that_waits_is_named_with_its_place() {
     );
 }
 
-/// What the forms of coordination wait for has names of its own: fluents, children and who has suspended it.
+/// Waits of the forms of coordination have names of their own: fluents, children, the suspending task.
 #[test]
 fn what_coordination_waits_for_is_named() {
     let program = r#"(define-fluent level 0)

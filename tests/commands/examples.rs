@@ -124,7 +124,7 @@ fn the_spacecraft_is_left_in_order_when_the_memory_stays_used_up() {
             seed * 40
         );
         let program = folder.file("flight.esl", format!("{greedy}\n{flight}"));
-        // What plays the battery may be gone, and the flight wait for ever for it.
+        // The task that plays the battery may have ended, and the flight waits for it for ever.
         let options = ["run", "--clock", "virtual", "--memory", "8M", "--budget", "500000", "--seed"];
         let mut command = eslvm(&options);
         command.arg(seed.to_string()).arg("--library").arg(&library).arg(program);
@@ -190,8 +190,7 @@ fn the_executive_flies_what_basilisk_simulates() {
     assert!(said.contains("no rule broken"), "{said}");
 }
 
-/// Returns a port that is free, from those that the system gives to nobody who asks for any; to each test
-/// another one.
+/// Returns a free port outside the range from which the system chooses ports; each test gets another one.
 pub(crate) fn free_port() -> u16 {
     static ASKED: AtomicU16 = AtomicU16::new(0);
     let first = 20_000 + u16::try_from(std::process::id() % 10_000).expect("it is small");

@@ -101,7 +101,7 @@ fn what_always_has_to_hold_is_checked_in_every_state() {
     let (status, output, _) = run(&folder, &["explore", "valves.esl"]);
     assert_eq!(status, Some(1), "{output}");
     assert!(output.contains("NEVER-BOTH-OPEN, which always has to hold, is false."), "{output}");
-    // In a critical section nobody comes in between.
+    // In a critical section no other task runs in between.
     let mended = valves
         .replace("(one (when", "(one (without-interrupts (when")
         .replace("(two (when", "(two (without-interrupts (when");
@@ -163,7 +163,7 @@ fn what_never_ends_is_told_or_given_up() {
     assert_eq!(run(&folder, &["explore", "check.esl"]).0, Some(1));
 }
 
-/// What takes no time never exceeds a limit of time, unless timers may end at any point.
+/// Work that takes no time never exceeds a limit of time, unless timers may end at any point.
 #[test]
 fn timers_may_end_at_any_point() {
     let folder = Folder::new("exploring-timers");
@@ -306,7 +306,7 @@ fn a_lost_update_of_an_object_is_found_by_default() {
             "{what}: {output}"
         );
         assert!(output.contains(", grain ticks does; no schedule so far ends badly ("), "{what}: {output}");
-        // In a critical section nobody comes in between, which grain `ticks` proves.
+        // In a critical section no other task runs in between, which grain `ticks` proves.
         folder.file("tank.esl", text(&format!("(without-interrupts {update})")));
         let (status, output, errors) = run(&folder, &["explore", "tank.esl"]);
         assert_eq!((status, errors.as_str()), (Some(0), ""), "{what}: {output}");

@@ -96,7 +96,7 @@ fn every_program_of_the_project_is_parsed_without_an_error() {
     assert!(errors.is_empty(), "{}", errors.join("\n"));
 }
 
-/// What an editor makes of each word of a program: of several patterns that match, the last one counts.
+/// Returns the highlighting of each word of a program: of several patterns that match, the last one counts.
 fn colours(program: &str) -> BTreeMap<String, String> {
     let language = tree_sitter_esl::LANGUAGE.into();
     let query = Query::new(&language, tree_sitter_esl::HIGHLIGHTS_QUERY).expect("the query fits the grammar");

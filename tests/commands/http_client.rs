@@ -10,7 +10,7 @@ use esl_conformance::process;
 use crate::eslvm;
 use crate::folder::Folder;
 
-/// What a server does after an answer.
+/// The action of a server after an answer.
 #[derive(Clone, Copy, PartialEq)]
 enum Then {
     /// It closes the connection.
@@ -244,7 +244,7 @@ fn compressed_bodies_are_decoded() {
     assert!(requests["/raw"].contains("\r\nAccept-Encoding: gzip\r\n"), "{requests:?}");
 }
 
-/// What the program asks for, and the request that is sent for it, up to the headers that all have.
+/// A form of the program, and the request that is sent for it, up to the headers that all requests have.
 #[rustfmt::skip]
 const SENT: &[(&str, &str, &str)] = &[
     (r#"(http:get (url "/a?b=c#d"))"#, "/a?b=c", "GET /a?b=c HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nAccept-Encoding: gzip, deflate\r\nConnection: close\r\n\r\n"),
@@ -260,7 +260,7 @@ const SENT: &[(&str, &str, &str)] = &[
     (r#"(http:request :propfind (url "/method") :headers '(("X" . 5)))"#, "/method", "PROPFIND /method HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nAccept-Encoding: gzip, deflate\r\nConnection: close\r\nX: 5\r\n\r\n"),
 ];
 
-/// What the program asks for, and the failure, before anything is sent.
+/// A form of the program, and its failure before anything is sent.
 #[rustfmt::skip]
 const REFUSED: &[(&str, &str)] = &[
     (r#"(http:get (url (format nil "/a~c~cX: y" #\Return #\Newline)))"#, "HTTP-ERROR the URL `http://127.0.0.1:PORT/a\\r\\nX: y` contains a control character"),
@@ -305,8 +305,8 @@ fn requests_are_sent_as_asked_or_not_at_all() {
     assert_eq!(requests.len(), SENT.len(), "of the refused ones nothing is sent: {requests:?}");
 }
 
-/// What the program asks for; the body and the status, or the failure. A target `/STATUS/WHERE` is redirected
-/// by that status; the others give back what they were sent.
+/// A form of the program; the status and the body, or the failure. A target `/STATUS/WHERE` is redirected by
+/// that status; the others send the request back.
 #[rustfmt::skip]
 const REDIRECTED: &[(&str, &str)] = &[
     (r#"(http:get (url "/301/a"))"#, "200 GET /a"),

@@ -93,7 +93,7 @@ fn answers(bytes: &[u8]) -> Vec<String> {
             answer += &format!(" allows {allowed}");
         }
         if let Some(length) = header("content-length").and_then(|length| length.parse::<usize>().ok()) {
-            // What follows is the next answer if there is no body.
+            // The next answer follows if the body is missing.
             if length > 0 && (rest.is_empty() || rest.starts_with(b"HTTP/1.")) {
                 answer += &format!(" of {length}");
             } else {

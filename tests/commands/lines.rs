@@ -219,7 +219,7 @@ fn a_listener_proves_who_it_is_and_drops_whom_it_cannot_talk_to() {
     let output = output.expect("nothing is wrong");
     let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
     let talk = "(\"good day\" END)";
-    // What is no TLS is answered by an alarm, or by the end.
+    // Plain text is answered by a TLS alert, or by the end of the connection.
     assert!(matches!(lines[2], "DROPPED" | ":CONNECTION-LOST"), "{lines:?}");
     assert_eq!((lines[0], lines[1], lines[3]), (talk, refused, talk));
     assert_eq!(heard, ["heard hello", "heard hello"]);

@@ -14,7 +14,7 @@ fn place(text: &str, word: &str, occurrence: usize) -> Value {
     json!({ "line": line, "character": text[line_start..at].encode_utf16().count() })
 }
 
-/// What a hover shows.
+/// Returns the text that a hover shows.
 fn hover(editor: &mut Editor, path: &str, place: Value) -> String {
     let answer = editor.ask_at("textDocument/hover", path, place, Value::Null);
     answer["contents"]["value"].as_str().unwrap_or_default().to_owned()

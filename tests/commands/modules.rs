@@ -195,7 +195,7 @@ fn two_tasks_that_require_a_module_run_it_once() {
         ("slower.esl", "(print 'slower) (sleep 1/10)"),
     ];
     let folder = Folder::with("modules-at-once", &files);
-    // Whoever waits for one that fails, or whose task is aborted, has a try of its own.
+    // A task that waits for a module whose loading fails or is aborted tries to load it itself.
     let expected =
         "BEGUN\nDONE\n(T NIL NIL)\nBAD\nBAD\n(:FAILED :FAILED)\nSLOWER\nSLOWER\nT\n(\"slower\" \"slow\")";
     folder.check_run(&["--clock", "virtual", "main.esl"], expected);
@@ -240,8 +240,7 @@ fn files_that_are_compiled_together_share_their_modules() {
     folder.check_run(&["out.eslb"], "1\n2");
 }
 
-/// What is in the files of the next test, and what is said about them: positions in the file, not in the
-/// form.
+/// The files of the next test, and the diagnostics about them: positions in the file, not in the form.
 const MISTAKES: [(&str, &str, &str); 3] = [
     (
         "warned.esl",

@@ -43,7 +43,7 @@ fn watch(folder: &Folder, program: &str) -> WatchedRun {
     WatchedRun { address: address.into(), observe: observe.into(), command: command.into(), run }
 }
 
-/// A viewer who takes events.
+/// A viewer that receives events.
 struct Viewer(BufReader<TcpStream>);
 
 impl Viewer {
@@ -126,7 +126,7 @@ fn a_viewer_sees_the_run_and_commands_it() {
     assert_eq!(left["holders"][0][0], right["n"]);
     assert!(left["cycle"] == true && event["role"] == "command", "{event}");
     assert!(event["relations"].as_array().is_some_and(|rows| rows.iter().any(|row| row["name"] == "MODE")));
-    // What one sees is one's own.
+    // Each viewer has a view of its own.
     let number = left["n"].as_u64().expect("it has a number");
     let view = format!(
         "{{\"viewer\":\"one\",\"text\":\"left\",\"from\":0,\"count\":50,\"task\":{number},\"relation\":\"NOTE\"}}"
@@ -145,7 +145,7 @@ fn a_viewer_sees_the_run_and_commands_it() {
         "{event}"
     );
     assert!(event["matching"].as_u64() > Some(2) && event["role"] == "observe", "{event}");
-    // Who only observes does nothing.
+    // The role `observe` permits no commands.
     let abort = format!("{{\"action\":\"abort\",\"task\":{number}}}");
     assert_eq!(status(&post(&address, "/do", &observe, &abort)), "403");
     let signal =
@@ -231,7 +231,7 @@ fn viewers_come_and_go() {
         let mut viewer = Viewer::come_in(&address, &observe, "same");
         (0..5).all(|_| viewer.goes_on())
     });
-    // Those who take nothing do not keep others from being served.
+    // Viewers that stop reading do not keep others from being served.
     let stalled: Vec<Viewer> =
         (0..3).map(|i| Viewer::come_in(&address, &observe, &format!("s{i}"))).collect();
     let mut viewer = Viewer::come_in(&address, &observe, "last");
@@ -255,7 +255,8 @@ fn a_viewer_who_takes_nothing_is_let_go() {
     let mut viewer = Viewer::come(&address, &observe, "awake");
     viewer.until("all tasks", |event| event["total"] == 201);
     let stalled = Viewer::come_in(&address, &observe, "stalled");
-    // Each view has an event sent at once, until the system keeps no more of them for who reads none.
+    // Each change of a view sends an event at once, until the buffers of a connection that is not read are
+    // full.
     let view = "{\"viewer\":\"stalled\",\"text\":\"\",\"from\":0,\"count\":120}";
     let gone = AtomicBool::new(false);
     std::thread::scope(|scope| {

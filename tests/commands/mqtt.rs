@@ -29,7 +29,7 @@ pub(crate) fn broker_program() -> Option<&'static str> {
 /// Starts a broker on a free port of the loopback, and waits until it listens.
 pub(crate) fn start_broker(program: &str, folder: &Folder, more: &str) -> (Broker, u16) {
     for _ in 0..20 {
-        // The port is free until somebody else takes it, which the broker says by ending.
+        // The port is free until another process takes it, in which case the broker ends.
         let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
         let port = port.expect("there is a free port").port();
         let settings = format!("listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n{more}");
@@ -134,8 +134,8 @@ fn start_peer(answer: &'static [u8], next: &'static [u8], stays: bool) -> u16 {
     port
 }
 
-/// What a peer answers first and second, whether it stays, the seconds that opening a client and subscribing
-/// may take, and what comes of it.
+/// A peer's first and second answer, whether it stays, the seconds that opening a client and subscribing may
+/// take, and the expected output.
 type PeerCase = (&'static [u8], &'static [u8], bool, (&'static str, &'static str), &'static str);
 
 /// Reads a packet: its first byte, and what follows its length. Returns nothing at the end.
@@ -231,7 +231,7 @@ fn a_client_says_what_its_options_say() {
     assert_eq!(packets, expected);
 }
 
-/// What is no broker, and what is one for a while only, are failures with causes; nothing hangs.
+/// Peers that are not brokers, or stop being one, lead to failures with causes; nothing hangs.
 #[test]
 fn a_broker_may_send_anything_or_nothing() {
     const WELCOME: &[u8] = b"\x20\x02\x00\x00";
@@ -277,7 +277,7 @@ fn a_broker_may_send_anything_or_nothing() {
     assert_eq!(lines, expected);
 }
 
-/// What a client leaves behind when it is killed, and not when it ends.
+/// The last will of a client is published when the client is killed, and not when it ends.
 #[test]
 fn the_last_will_of_a_client_that_is_killed_is_published() {
     let Some(program) = broker_program() else {
@@ -376,7 +376,7 @@ fn a_secured_broker_acknowledges_what_is_published() {
 (mqtt:with-client (c \"127.0.0.1\" *port* :tls t :ca-file \"ca.pem\")
   (dotimes (i 150)
     (mqtt:publish c \"kept/x\" (princ-to-string i) :qos (+ 1 (mod i 2)) :retain t))
-  ;; What is acknowledged is there, whoever asks next.
+  ;; An acknowledged message is there for the next client.
   (mqtt:with-client (d \"127.0.0.1\" *port* :tls t :ca-file \"ca.pem\")
     (print (multiple-value-list (wait-for-event (mqtt:subscribe d \"kept/#\"))))))
 (cause (mqtt:with-client (c \"127.0.0.1\" *port* :tls t) c))

@@ -54,7 +54,7 @@ impl Operated {
     /// Ends the standard input, which ends the programs here, and returns what they came to.
     pub(crate) fn finish(mut self) -> Finished {
         drop(self.child.stdin.take());
-        // What it says is read on, so that it never waits for a full pipe.
+        // Its errors are read on, so that it never waits for a full pipe.
         let mut errors = self.errors;
         let reader = std::thread::spawn(move || {
             let mut text = String::new();
@@ -71,7 +71,7 @@ pub(crate) fn exchange(address: &str, bytes: impl AsRef<[u8]>) -> String {
     let mut stream = TcpStream::connect(address).expect("somebody listens");
     stream.set_read_timeout(Some(PATIENCE)).expect("it can be set");
     stream.set_write_timeout(Some(PATIENCE)).expect("it can be set");
-    // Who does not like the beginning may not read the rest.
+    // A run that refuses the beginning need not read the rest.
     drop(stream.write_all(bytes.as_ref()));
     let mut answer = Vec::new();
     drop(stream.read_to_end(&mut answer));

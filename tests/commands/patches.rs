@@ -75,7 +75,7 @@ fn a_patch_of_kinds_and_shared_things_is_made_and_undone_in_one_step() {
     assert_eq!(run.finish().output, "(3 NIL 7 10)\n");
 }
 
-/// What a patch defines for the first time has no name after it is undone, and can be defined otherwise then.
+/// New definitions of a patch have no name once it is undone, and can be made otherwise then.
 #[test]
 fn rules_are_patched_and_new_kinds_are_gone_after_an_undo() {
     let folder = Folder::new("attach_undo");
@@ -219,7 +219,7 @@ fn a_patch_of_other_definitions_is_undone_as_a_whole() {
         "{output}"
     );
     assert!(output.contains("\n:PATCHED"), "{output}");
-    // What fails half-way has changed nothing.
+    // A patch that fails half-way has changed nothing.
     assert_eq!(output.matches(after).count(), 2, "{output}");
     assert_eq!(output.matches(before).count(), 2, "{output}");
     assert_eq!(lines.iter().filter(|line| line.contains(":NO-APPLICABLE-METHOD")).count(), 2, "{output}");

@@ -152,7 +152,7 @@ fn a_package_that_a_loaded_file_makes_is_explained() {
     assert_eq!(lines(&folder, "good.lisp", &[]).len(), 1);
 }
 
-/// What is not a byte is refused, whichever way it is sent.
+/// Values that are not bytes are refused by every operation that sends.
 #[test]
 fn only_bytes_are_sent_as_bytes() {
     let text = "(require :sockets)

@@ -131,7 +131,7 @@ fn the_page_runs_programs_and_stops_them() {
     browser.until(&format!("{output}.startsWith('Hello, world!')"));
     browser.until("document.querySelector('#pg-timeline img')?.naturalWidth === 1200");
 
-    // What is wrong is underlined while one types, and told again by a run.
+    // Faults are underlined during typing, and reported again by a run.
     type_text(&mut browser, "(print (drvie))\n");
     browser.until("document.querySelector('.mark-error, .mark-warning')?.textContent === 'drvie'");
     browser.until("document.querySelector('#pg-diagnostics li button')?.textContent === '1:9'");

@@ -22,7 +22,7 @@ fn a_form_that_signals_does_not_put_off_the_timeout_of_wait_until() {
 
 #[test]
 fn the_time_of_the_processor_passes_only_while_something_is_computed() {
-    // What the processor does for other processes does not count, so this holds on a busy machine.
+    // Time that the processor spends on other processes does not count, so this holds on a busy machine.
     let program = r"
 (defun spent-by (function)
   (let ((begin (get-internal-run-time)))

@@ -274,7 +274,7 @@ fn line_is_like(shown: &str, found: &str) -> bool {
     rest.is_empty()
 }
 
-/// What is evaluated at a stop is evaluated in a copy.
+/// Forms at a stop are evaluated in a copy.
 #[test]
 fn a_replay_goes_on_as_if_nothing_had_been_printed() {
     let folder = Folder::new("replay-print");
@@ -289,7 +289,7 @@ fn a_replay_goes_on_as_if_nothing_had_been_printed() {
     assert!(again.output.contains("\n200 "), "{}", again.output);
 }
 
-/// What is typed wrong is answered, and changes nothing.
+/// A mistyped command is answered, and changes nothing.
 #[test]
 fn mistakes_in_commands_are_answered() {
     let folder = Folder::new("replay-mistakes");

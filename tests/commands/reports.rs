@@ -128,7 +128,7 @@ fn a_failure_of_a_mock_keeps_its_calls() {
     assert!(lines.contains(&"  in GO-ON, f.esl:7:23".to_owned()), "{lines:#?}");
 }
 
-/// A task that nobody waits for says where its body begins.
+/// The report of a task that no other task waits for says where its body begins.
 #[test]
 fn a_task_of_its_own_says_where_it_begins() {
     let program = format!("{FUNCTIONS}(spawn (:name 'left) (list (outer 1)))\n(sleep 1)\n(fail :end)");

@@ -141,11 +141,11 @@ fn a_session_of_an_operator_has_the_same_flags() {
     assert_eq!(ask(&[], &spawned), refused);
     let narrowed = format!("(with-rights () {look})");
     assert_eq!(ask(&["--allow-read=../other"], &narrowed), format!("(:READ {secret:?} NIL)\n"));
-    // What the run lacks, no session has.
+    // A session has no right that the run lacks.
     assert!(
         ask(&["--allow-all"], "(probe-file \"/etc/passwd\")").contains("--allow-read=/etc/passwd grants it.")
     );
-    // What is below the folder of the run needs no flag, and the session starts only with flags that parse.
+    // Files below the folder of the run need no flag, and the session starts only with flags that parse.
     assert_eq!(ask(&[], "(and (probe-file \"own\") t)"), "T\n");
     folder.file("wrong", "read everything\n");
     assert!(ask(&["--rights", &folder.join("wrong")], "1").contains("wrong:1:"));
@@ -225,7 +225,7 @@ fn a_unix_socket_needs_both_rights() {
     assert_eq!(lines(&folder, &[]), [write, read, write, read]);
 }
 
-/// What a script or a mock answers reaches nothing outside; what none answers needs its right.
+/// A call that a script or a mock answers reaches nothing outside; any other call needs its right.
 #[test]
 fn what_a_script_or_a_mock_answers_needs_no_right() {
     let text = "(require :process) (require :sockets)

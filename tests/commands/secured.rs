@@ -76,7 +76,7 @@ fn operators_and_figures_are_reached_over_tls() {
         "{}",
         attached.errors
     );
-    // The system does not trust this authority, and the run says nothing to those who say no TLS.
+    // The system does not trust this authority, and the run does not answer plain text.
     let refused = attach(&["--tls"]);
     assert_eq!((refused.status, &*refused.output), (Some(2), ""), "{}", refused.errors);
     let plain = attach(&[]);

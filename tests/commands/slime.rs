@@ -44,7 +44,7 @@ fn start(folder: &Folder) -> (Operated, String) {
 struct SlimeClient {
     stream: TcpStream,
     asked: usize,
-    /// What was said that nobody has waited for.
+    /// Messages received and not awaited yet.
     heard: Vec<String>,
 }
 
@@ -206,7 +206,7 @@ fn a_client_evaluates_looks_up_and_compiles() {
     assert!(client.ask("(swank:kill-nth-thread 99)").starts_with("(:abort \"there is no row 99 "));
     client.wait_for_end_of("idler");
     assert!(!client.ask("(swank:list-threads)").contains("IDLER"));
-    // What hangs is aborted.
+    // A hanging call is aborted.
     client.ask("(swank:interactive-eval \"(defvar *begun* nil)\")");
     let hangs =
         client.begin("(swank:interactive-eval \"(progn (setq *begun* t) (loop (sleep 1000)))\")", "t");

@@ -1,4 +1,4 @@
-//! What an attached operator does to tasks: watching values, having tasks stand still, go on and end.
+//! Commands of an attached operator on tasks: watching values, suspending, resuming and ending tasks.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin};
@@ -107,7 +107,7 @@ fn tasks_stand_still_go_on_and_end() {
     operator.types(&format!(":resume {number}"));
     operator.types("(progn (loop while (zerop *n*) do (sleep 0.001)) :counts)");
     operator.hears_of(":COUNTS");
-    // All tasks of the program stand, and what is evaluated, too; who only looks is answered.
+    // All tasks of the program stand still, and so do evaluations; surveys are answered.
     operator.types(":pause");
     operator.types(":facts mode");
     operator.hears_of("(MODE CALM)");
@@ -137,7 +137,7 @@ fn many_facts_are_shown_by_pages() {
         (":facts", 501, "; 1 to 500 of 1204; `:facts NAME 500` shows those after these"),
         (":facts mode", 1, "(MODE CALM)"),
         (":data", 2, "relation SEEN/1: 1203 facts"),
-        // What is wrong with a command is said in its own words.
+        // A mistake in a command is reported in the words of that command.
         (":bt two", 1, "; `:bt` needs the number of a task, which `:tasks` shows, or nothing"),
         (":resume", 1, "; `:resume` needs the number of a task, which `:tasks` shows"),
         (":suspend 99", 1, "; there is no task 99"),

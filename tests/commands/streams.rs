@@ -123,7 +123,7 @@ fn a_fifo_whose_writer_comes_late_delays_only_its_reader() {
 
 #[test]
 fn data_are_read_from_files_and_fifos() {
-    // What is longer than what is read of a file at once, in many data and in one, is read in parts.
+    // Data longer than one read of a file, in many data and in one, are read in parts.
     let text = "(with-open-file (s \"long\" :direction :output)
   (format s \"(~{(item ~d \\\"text\\\")~}) \" (loop for i below 40000 collect i))
   (dotimes (i 40000) (format s \"(item ~d) \" i))
@@ -154,7 +154,7 @@ fn data_are_read_from_files_and_fifos() {
 
 #[test]
 fn programs_that_are_loaded_from_slow_files_delay_only_their_task() {
-    // What is loaded, and then a module, come from FIFOs whose writers come late; a load can be left.
+    // A loaded program, and then a module, come from FIFOs whose writers come late; a load can be left.
     let text = "(spawn (:name 'other :daemon t) (dotimes (i 50) (sleep 0.001)) (mark \"ticked\") (loop (sleep 0.001)))
 (load \"in\")
 (mark \"loaded\")

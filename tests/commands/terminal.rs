@@ -1,4 +1,4 @@
-//! A session at a terminal: one that is a pair of files, with nobody to see it.
+//! A session at a terminal, which is a pair of files.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -16,7 +16,7 @@ use crate::operate::{Operated, until};
 /// Output of a session, as it comes.
 struct Output {
     pieces: Receiver<String>,
-    /// What has come and was not awaited yet.
+    /// Output received and not awaited yet.
     unread: String,
 }
 

@@ -146,7 +146,7 @@ fn the_trace_of_a_large_program_keeps_them_too() {
 #[test]
 fn with_a_virtual_clock_the_trace_is_the_same_every_time() {
     let options = ["--clock", "virtual", "--seed", "3"];
-    // What a failure says of itself takes work in proportion to the length of the file's name.
+    // Describing a failure takes work in proportion to the length of the file's name.
     let is_same = run("one.json", PROGRAM, &options) == run("two.json", PROGRAM, &options);
     assert!(is_same, "one.json and two.json differ");
 }

@@ -15,7 +15,7 @@ struct Running {
     _folder: Folder,
 }
 
-/// What has become of a program.
+/// The end of a program.
 struct Ended {
     status: Option<i32>,
     output: String,
@@ -260,7 +260,7 @@ fn a_limit_of_the_size_of_files_fails_the_write() {
     assert_eq!(run.output.split_whitespace().collect::<Vec<_>>(), ["STREAM-ERROR", "OFF"], "{}", run.errors);
 }
 
-/// A program whose output nobody reads ends with its cleanups, and with a status that is no success.
+/// A program whose output is not read any more ends with its cleanups, and with a status other than success.
 #[test]
 fn an_output_that_nobody_reads_ends_the_run_as_sigpipe_does() {
     let text = "(unwind-protect (loop (format t \"line~%\"))

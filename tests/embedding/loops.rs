@@ -82,7 +82,7 @@ fn a_future_of_a_run_waits_for_time_and_for_what_comes() {
 fn functions_are_held_and_called_from_anywhere() {
     let (mut engine, mut other) = (engine(), engine());
     let count = engine.function("(let ((n 0)) (lambda (&optional (by 1)) (incf n by)))").expect("it is one");
-    // What is held survives collections.
+    // Held values survive collections.
     check(&mut engine, "(dotimes (i 200000) (list i i i))", "NIL");
     assert_eq!(engine.call::<i64>(&count, [5_i64.into()]), Ok(5));
     let handle = engine.handle();

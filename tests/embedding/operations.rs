@@ -269,7 +269,7 @@ fn an_executor_that_polls_once_gets_only_what_has_to_wait() {
     go.send(7).expect("the future is there");
     assert!(job.poll_once().is_none());
     check(&mut engine, "(operation-result *later*)", "7");
-    // One that is left while nobody polls it is dropped when it is polled, and one that is dropped fails.
+    // An operation that is left between polls is dropped at the next poll, and a dropped one fails.
     let left = "(handler-case (with-timeout 0.01 (unwind-protect (later) (give-up)))
                   (failure (f) (failure-cause f)))";
     let jobs = handed_on.clone();
@@ -322,7 +322,7 @@ fn of_several_ends_of_an_operation_the_first_counts() {
     let host = RealHost::new(Vec::new()).with_screen(Box::new(|_| Ok(())));
     let inbox = host.inbox();
     let mut engine = Engine::with(Config::default(), Box::new(host)).expect("there is room for the library");
-    // The type allows one end only; a host of somebody's own may put more into the inbox.
+    // The type allows one end only; a host of an embedder may put more into the inbox.
     let begin = move |operation: Operation| {
         let end = |number, text: &str| {
             let values = vec![Datum::string(text, Span::default())];

@@ -1,4 +1,4 @@
-//! What others ask of a running engine: signals, calls, tasks that they start, pauses, observers.
+//! Requests to a running engine from other threads: signals, calls, new tasks, pauses, observers.
 
 use esl::host::{RealHost, RecordingHost, ReplayHost, SendError};
 use esl::{Config, Data, Engine, Error};
@@ -190,7 +190,7 @@ fn a_pause_stops_tasks_until_it_is_over() {
     handle.pause();
     let other = handle.clone();
     let thread = std::thread::spawn(move || {
-        // What is asked while it pauses is answered, calls excepted.
+        // Requests during a pause are answered, calls excepted.
         let tasks = other.tasks().wait();
         other.resume();
         let n = other.call::<i64>("n", []).wait();
@@ -231,7 +231,7 @@ fn a_run_with_questions_is_replayed() {
                 (1..50).all(|n: i64| handle.call::<i64>("f", [n.into()]).wait() == Ok(n))
             })
         });
-        // Without the thread nobody asks; the recording has it all.
+        // In the replay no thread sends requests; the recording has them all.
         check(&mut engine, "(loop until (eql (wait-for-event done) 49))", "NIL");
         let canary = engine.canary();
         if let Some(thread) = thread {

@@ -96,7 +96,7 @@ fn what_the_program_cannot_reach_any_more_is_dropped() {
         engine.eval("(dotimes (i 300) (make-array 10000))").unwrap();
         assert_eq!(alive.load(Ordering::SeqCst), 2, "with a collection at each safepoint: {collect_always}");
         check(&mut engine, "(mapcar #'motor-name *kept*)", "(\"a\" \"b\")");
-        // What Rust holds lives on without the program.
+        // A value that Rust holds lives on without the program.
         let held = Arc::new(std::sync::Mutex::new(None));
         let keep = held.clone();
         engine

@@ -54,7 +54,7 @@ pub enum Problem {
     },
     /// An index out of range.
     Index {
-        /// What it should be an index of.
+        /// The table that it should be an index of.
         of: &'static str,
         /// The index.
         found: u32,

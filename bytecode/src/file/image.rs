@@ -294,7 +294,7 @@ impl ModuleImage {
         self.function_count
     }
 
-    /// One function, without its variables, which nobody but debuggers needs.
+    /// Returns one function, without its variables, which only debuggers need.
     ///
     /// # Errors
     /// [`ReadError::Damaged`], also if there is no such function.

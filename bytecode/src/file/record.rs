@@ -1,4 +1,4 @@
-//! What a file says of a symbol or a constant, read where it stands.
+//! Symbols and constants of a file, read in place.
 
 use num_bigint::BigInt;
 

@@ -1,5 +1,5 @@
-//! What a package has is changed: symbols are exported, imported and shadowed, and packages used. Each change
-//! is whole, or there is none.
+//! Changes of a package: symbols are exported, imported and shadowed, and packages used. Each change is made
+//! completely or not at all.
 
 use std::borrow::Cow;
 

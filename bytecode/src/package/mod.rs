@@ -69,7 +69,7 @@ struct NameEntry {
     external: bool,
     /// Whether it hides what is inherited under the same name.
     shadowing: bool,
-    /// The symbol, once somebody has asked for it.
+    /// The symbol, from the first request for it on.
     symbol: Option<Symbol>,
 }
 

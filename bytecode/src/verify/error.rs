@@ -1,4 +1,4 @@
-//! What the verifier finds, and where.
+//! Faults that the verifier finds, and their places.
 
 use std::fmt;
 
@@ -27,7 +27,7 @@ pub enum FaultPlace {
     Toplevel(usize),
 }
 
-/// What is wrong. The text of each says which rule of the verifier it belongs to.
+/// A broken rule. The comment of each variant names the rule of the verifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// V1: no opcode has this number.

@@ -1,4 +1,4 @@
-//! What an instruction expects of the state at its place, and what it does to it.
+//! Preconditions of an instruction on the state at its place, and its effect on that state.
 
 use super::error::Fault;
 use super::registers::Class;

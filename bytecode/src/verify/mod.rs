@@ -61,7 +61,7 @@
 //! * **V14, variables.** The range of each variable lies in the code, its register or capture is there, and
 //!   at each place of the range that control gets to, the register holds an object of the program or a box.
 //!
-//! What the theorem asks of the interpreter in return:
+//! Obligations of the interpreter in return:
 //!
 //! * **M1.** An instruction of the kind `never` does all its work, is tried again, or is left by an
 //!   unwinding. Control does not pass to the next instruction in another way.

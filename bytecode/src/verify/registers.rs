@@ -1,4 +1,4 @@
-//! What is known of the registers of a frame at one place of its code.
+//! The known contents of the registers of a frame at one place of its code.
 
 use smallvec::SmallVec;
 

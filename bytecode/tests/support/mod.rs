@@ -107,14 +107,14 @@ pub(crate) fn module_with_random_code(random: &mut Random) -> Module {
     Module { constants, functions, ..Module::default() }
 }
 
-/// What one piece of random code is made of: few opcodes and registers, so that they meet often.
+/// The material of one piece of random code: few opcodes and registers, so that they meet often.
 struct Palette {
     leaves: Vec<Opcode>,
     regions: Vec<Region>,
     registers: usize,
 }
 
-/// What begins a region of code, what ends it, and what ends a part after that.
+/// The opcode that begins a region of code, the one that ends it, and the one that ends a part after that.
 type Region = (Opcode, Opcode, Option<Opcode>);
 
 const REGIONS: &[Region] = &[

@@ -71,7 +71,7 @@ pub struct Expander {
     pub(super) places: Vec<SetfExpansion>,
     /// Functions of local macros that have no name yet; `None` for one whose definition failed.
     pub(super) objects: Vec<Option<ObjectId>>,
-    /// What the next answer is about.
+    /// The request that the next answer belongs to.
     pub(super) waiting: AwaitedOutcome,
     /// Form of the last macro call for which the expander stopped.
     pub(super) call: Option<Datum>,

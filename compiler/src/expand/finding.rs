@@ -12,7 +12,7 @@ use super::origin::OriginId;
 use super::unit::UnitFindings;
 use crate::diagnostic::code;
 
-/// Findings beyond which no more warnings are kept: nobody reads so many, and they take memory.
+/// Findings beyond which further warnings are dropped: they would take memory and help no reader.
 const MAX_FINDINGS: usize = 10_000;
 
 impl Expander {

@@ -124,7 +124,7 @@ pub(super) struct LetBindings {
     /// Bindings that are to be looked at.
     pub(super) found: std::vec::IntoIter<VariableBinding>,
     pub(super) body: Body,
-    /// What is to be done when all variables are bound, so far.
+    /// Jobs to run once all variables are bound, in the order found.
     pub(super) jobs: Vec<Job>,
     /// Names that enter the scope of the body.
     pub(super) entries: Vec<ScopeEntry>,
@@ -147,7 +147,7 @@ pub(super) struct LongCond {
     pub(super) items: std::vec::IntoIter<Datum>,
     /// Nodes of the others.
     pub(super) nodes: Vec<NodeId>,
-    /// What is to be done for these.
+    /// Jobs that fill these nodes.
     pub(super) jobs: Vec<Job>,
 }
 
@@ -167,7 +167,7 @@ pub(super) struct LocalFunctions {
     pub(super) functions: Vec<(VarId, LambdaId)>,
     /// Their names, as they enter a scope.
     pub(super) entries: Vec<ScopeEntry>,
-    /// What expands their texts.
+    /// Jobs that expand their lambda expressions.
     pub(super) lambdas: Vec<Job>,
 }
 
@@ -208,7 +208,7 @@ pub(super) enum Job {
     Use(Box<PlaceUse>, To),
 }
 
-/// What the next answer is about.
+/// The request that the next answer belongs to.
 #[derive(Debug)]
 pub(super) enum AwaitedOutcome {
     /// Nothing was asked.

@@ -19,7 +19,7 @@ struct Definition {
     body: Vec<Datum>,
 }
 
-/// What a form with local definitions needs first.
+/// The expected first argument of a form with local definitions.
 const SHAPE: &str = "needs a list of definitions, such as `((f (x) (* x x)))`";
 
 /// Returns the definitions of a form, as written.

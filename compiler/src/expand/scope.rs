@@ -137,7 +137,8 @@ pub(super) struct Scope {
     /// Functions that are declared `notinline` here, or `inline`.
     written: FxHashMap<Symbol, bool>,
     log: Vec<Undo>,
-    /// What macros may ask for: functions, macros, symbol macros, and variables that hide one of these.
+    /// The names that macros may look up: functions, macros, symbol macros, and variables that hide one of
+    /// these.
     locals: Locals,
 }
 

@@ -5,7 +5,7 @@
 //! compile time, so that macros may call them; `eval-when` is as in Common Lisp.
 //!
 //! A form given to `eval` is treated likewise, except that each of its top-level forms is evaluated before
-//! the next one is expanded. The last one is left to the caller, who wants its value.
+//! the next one is expanded. The last one is left to the caller, which needs its value.
 
 use esl_bytecode::compile::{Environment, GlobalFunction, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};

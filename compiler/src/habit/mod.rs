@@ -1,7 +1,6 @@
-//! Habits from other languages: what the author of a text meant who writes Python, JavaScript, C or Scheme
-//! in it.
+//! Habits from other languages: the ESL that the author of a text in Python, JavaScript, C or Scheme meant.
 //!
-//! [`word`] is the table of foreign words; [`statement`] recognizes lines that are no Lisp; [`operator`]
+//! [`word`] is the table of foreign words; [`statement`] recognizes lines that are not Lisp; [`operator`]
 //! knows operators between their operands, and names before parentheses. The reader and the expander ask
 //! where they would report a fault in any case, or where a top-level datum does not begin with `(`, so
 //! correct programs do not pay for it.

@@ -101,7 +101,7 @@ impl GatheredVariables {
             let before = self.pending.len();
             let kind = &gatherer.core.nodes[node.index()].kind;
             children(kind, &mut |child| self.pending.push((child, site)));
-            // What is inside these may be entered again.
+            // The contents of these forms may be entered again.
             let repeats = matches!(kind, NodeKind::Tagbody(..) | NodeKind::Recovery { .. });
             work.add(1 + (self.pending.len() - before) as u64 / PARTS_PER_UNIT);
             self.current = gatherer.begin(node, site, self.most);
@@ -126,7 +126,7 @@ impl GatheredVariables {
             }
             self.replaced += PARTS_PER_UNIT as usize;
         }
-        // What is added to the form later has no such references.
+        // Nodes added to the form later have no such references.
         self.replaced = usize::MAX;
         true
     }

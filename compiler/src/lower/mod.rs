@@ -80,13 +80,13 @@ pub struct Lowering {
     stage: LoweringStage,
     /// Whether functions have been divided that are too large to be lowered in one part.
     is_in_parts: bool,
-    /// What is wrong with the functions that did not fit as they were, once that was tried.
+    /// Faults of the functions that did not fit undivided; `None` before the first attempt.
     oversized: Option<Vec<Diagnostic>>,
     /// Limits that are left for dividing functions.
     limits: std::slice::Iter<'static, split::Limits>,
 }
 
-/// What a [`Lowering`] does next.
+/// The next step of a [`Lowering`].
 enum LoweringStage {
     Begin,
     Divide(Box<split::FunctionDivision>),

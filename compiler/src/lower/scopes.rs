@@ -5,8 +5,8 @@
 //! [`ranges`] turns this into ranges of the finished code.
 //!
 //! A task stands only at instructions that can fail, call or loop, or to which a loop goes back. Only there
-//! does it matter what is in scope. In between, values are on their way: a call may have laid its window over
-//! variables that nobody reads any more.
+//! does the scope matter. In between, values are in transit: the window of a call may already overlap
+//! variables that are not read any more.
 
 use esl_bytecode::operand::Reg;
 
@@ -67,7 +67,7 @@ impl VariableScopes {
     }
 }
 
-/// What [`ranges`] has to know of an instruction in its final place.
+/// An instruction in its final place, as [`ranges`] needs it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ScopedInstr {
     /// Its first word, and the one behind it.

@@ -25,7 +25,7 @@ pub(super) enum VariableLocation {
     Spilled(Int16),
 }
 
-/// What is in use outside a form that binds variables.
+/// The registers and spilled places in use outside a form that binds variables.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OuterScope {
     top: Reg,

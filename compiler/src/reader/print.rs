@@ -1,7 +1,7 @@
 //! Data as text that reads back.
 //!
-//! For people who look at expansions, and for tests; running programs print by the library. The text is one
-//! line, which does not show sharing and the identity of symbols without a package. No native recursion.
+//! For readers of expansions, and for tests; running programs print by the library. The text is one line,
+//! which shows neither sharing nor the identity of symbols without a package. No native recursion.
 
 use std::fmt::Write;
 

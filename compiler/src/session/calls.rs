@@ -16,7 +16,7 @@ pub(super) struct FormCalls {
     form: Datum,
     /// Calls to be made, the next one last.
     calls: Vec<Datum>,
-    /// What has come in the place of calls, by the addresses of their nodes.
+    /// Results that replace calls, by the addresses of the calls' nodes.
     made: FxHashMap<usize, Datum>,
 }
 

@@ -69,7 +69,7 @@ pub(super) fn without_consequences(
         let span = report.primary.span;
         !outermost.iter().any(|extent| extent.contains(span) && extent.start < span.start)
     }));
-    // What cannot be compiled must not become a program.
+    // Text that cannot be compiled must not become a program.
     for diagnostic in &mut kept {
         let is_lost = lost_errors.iter().any(|extent| is_report(diagnostic, *extent));
         if is_lost && diagnostic.severity == Severity::Warning {

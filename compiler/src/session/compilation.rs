@@ -229,7 +229,7 @@ impl CompilationState {
             StepOutcome::Failed(failure) => {
                 let message = format!("the module `{name}` is not available: {}", failure.report);
                 self.diagnostics.push(code::UNKNOWN_MODULE.at(span, message));
-                // What the module defines may be used in all forms after it.
+                // All forms after it may use definitions of the module.
                 queue.leave_out_forms();
             }
             _ => queue.add_call(name, span),

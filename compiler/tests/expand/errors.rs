@@ -1,4 +1,4 @@
-//! What is said of wrong and doubtful forms.
+//! Diagnostics of wrong and doubtful forms.
 
 use esl_compiler::diagnostic::code::{ALL, DiagnosticCode, Stage};
 

@@ -1,4 +1,4 @@
-//! What the core language says of variables and blocks.
+//! Flags of variables and blocks in the core language.
 
 use esl_compiler::core::Core;
 

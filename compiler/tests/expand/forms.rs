@@ -1,4 +1,4 @@
-//! What each kind of form becomes.
+//! The expansion of each kind of form.
 
 use crate::{expand_lines, snapshot};
 

@@ -28,7 +28,7 @@ pub(crate) struct FakeHost {
     objects: usize,
     /// The place at which macros fail.
     pub(crate) failing_place: Option<SourcePlace>,
-    /// What was loaded: whether to keep, and the symbols among the constants.
+    /// The loaded modules: whether each is to be kept, and the symbols among its constants.
     pub(crate) loaded: Vec<(bool, String)>,
 }
 
@@ -139,7 +139,7 @@ impl FakeHost {
     }
 }
 
-/// What a program's data look like: no place in the source.
+/// Returns the datum as a program makes it: without places in the source.
 pub(crate) fn without_spans(datum: &Datum) -> Datum {
     use esl_bytecode::datum::DatumKind;
     let none = Span::default();
@@ -236,7 +236,7 @@ impl CompileTimeHost for FakeHost {
             _ => None,
         });
         let symbols: Vec<String> = symbols.collect();
-        // What the functions for definitions would do.
+        // Stands in for the functions that make definitions.
         self.loaded.push((keep, symbols.join(" ")));
         if keep {
             self.objects += 1;

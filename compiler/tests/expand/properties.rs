@@ -1,4 +1,4 @@
-//! What holds of all forms, sensible or not.
+//! Properties of all forms, sensible or not.
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::{SourceId, Span};

@@ -1,4 +1,4 @@
-//! What texts denote.
+//! The data that texts denote.
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Home;

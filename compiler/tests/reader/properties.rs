@@ -1,4 +1,4 @@
-//! What holds of every text and every datum.
+//! Properties of every text and every datum.
 
 use esl_bytecode::BigInt;
 use esl_bytecode::datum::{Datum, DatumKind};

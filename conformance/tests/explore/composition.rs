@@ -21,7 +21,7 @@ const BODIES: &str = "
           esl::*%watches*
           (if esl::*%suspensions* (hash-table-count esl::*%suspensions*) 0)))";
 
-/// What is left when nothing is: the main task.
+/// The result of `left` when only the main task is left.
 pub(crate) const NOTHING: &str = "(0 1 0 0 0 0)";
 
 /// Checks that a program with such bodies ends well under every schedule, with these outputs.

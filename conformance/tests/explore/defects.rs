@@ -128,7 +128,7 @@ fn a_secondary_subscriber_looks_before_it_waits() {
     );
 }
 
-/// Defect: an owner that leaves tells nobody.
+/// Defect: an owner that leaves notifies no subscriber.
 #[test]
 fn an_owner_that_dies_before_achieving_is_succeeded() {
     check_locks(

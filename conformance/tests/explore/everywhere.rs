@@ -7,7 +7,7 @@
 
 use crate::composition::{NOTHING, check_bodies};
 
-/// What the programs begin with. `others` runs beside a form, and ends by itself.
+/// Returns the beginning of the programs. `others` runs beside a form, and ends by itself.
 fn setup(others: &str) -> String {
     format!(
         "(defmacro outcome (form)
@@ -216,7 +216,7 @@ fn a_quota() {
     check_abort_and_failure(
         "",
         "(with-quota (:tasks 1) (task-net (a (body (go-on)))) 'enough)",
-        // The task of the guardian, too, belongs to who has made it, outside.
+        // The task of the guardian, too, belongs to its maker, outside.
         &["ENOUGH"],
     );
 }

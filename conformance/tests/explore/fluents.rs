@@ -1,4 +1,4 @@
-//! Fluents under all schedules: whoever waits sees every change that matters, whatever comes in between.
+//! Fluents under all schedules: a waiting task sees every change that matters, whatever comes in between.
 
 use esl::explore::Grain;
 

@@ -253,9 +253,9 @@ fn a_livelock_goes_round_as_often_as_one_likes() {
     let [one, two, three] = [1, 2, 3].map(after);
     let round = two.len() - one.len();
     assert!(round > 0 && three.len() - two.len() == round, "{one} {two} {three}");
-    // Who waits in turn for what another task will do goes round only as long as the other one has no turn.
+    // A loop that waits for an act of another task goes round only as long as the other one has no turn.
     let patient = "(defvar *stop* nil) (spawn (setq *stop* t)) (loop until *stop* do (sleep 0))";
-    // And who asks for luck has it at some time.
+    // And a loop that waits for a choice ends with the right one.
     for text in [patient, "(loop (when (choose nil t) (return)) (sleep 0))"] {
         let found = explore(&compile(text), &settings).expect("it runs");
         assert!(found.has_cycle && found.livelock.is_none() && found.endless.is_none(), "{text}: {found:?}");

@@ -83,7 +83,7 @@ fn preemption_abort_and_request_come_in_any_order() {
 
 #[test]
 fn two_requests_that_preempt_and_an_abort_come_in_any_order() {
-    // Who is aborted wants something, holds it, or has been preempted.
+    // The aborted task requests the resource, holds it, or has been preempted.
     check_resources(
         "(define-resource seat :capacity 2)
          (defvar *inside* 0)

@@ -5,7 +5,7 @@ use esl::explore::Grain;
 
 use crate::check;
 
-/// What is left of suspensions, and a step that others can see.
+/// `left` counts the remaining suspensions; `go-on` is a step that others can see.
 const LEFT: &str = "
   (defvar *step* (make-event))
   (defun go-on () (signal *step*))

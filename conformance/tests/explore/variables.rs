@@ -45,7 +45,7 @@ fn a_variable_that_is_made_during_the_run_is_watched() {
 
 #[test]
 fn programs_end_as_with_switches_at_all_ticks() {
-    // What a task does at a step, with its number in place of `#`.
+    // The actions of a task at a step, with its number in place of `#`.
     let steps =
         ["(setq *n* #)", "(push *n* seen-#)", "(assert '(mark #))", "(push (db-query '(mark ?)) seen-#)"];
     let pairs: Vec<String> = steps

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use crate::form::*;
 
-/// What a program is expected to write; `None` if it takes too long.
+/// Returns the expected output of a program; `None` if it takes too long.
 pub(crate) fn expectation(form: &Form) -> Option<String> {
     let mut model = Model {
         output: Vec::new(),

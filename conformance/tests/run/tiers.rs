@@ -24,7 +24,7 @@ const PROGRAMS: u64 = 8;
 /// Small functions in a random program.
 const SMALL: u64 = 6;
 
-/// What of a run does not depend on how functions run.
+/// The part of a run that does not depend on how functions run.
 #[derive(Debug, PartialEq)]
 pub(super) struct TierOutcome {
     output: String,

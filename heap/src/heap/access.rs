@@ -134,7 +134,7 @@ impl Heap {
     /// Returns the first `N` slots of a record of this kind, to be set; `None` if `v` is not one, has fewer,
     /// or is of a kind whose slots [`Heap::record_set`] does not set.
     ///
-    /// All of them count as overwritten, so this is for those who set several.
+    /// All of them count as overwritten, so this is for code that sets several.
     #[inline(always)]
     pub fn slots_mut<const N: usize>(&mut self, v: Value, kind: Kind) -> Option<&mut [Value; N]> {
         if !kind.is_record() || is_vouched_for(kind) {
@@ -142,7 +142,7 @@ impl Heap {
         }
         let object = self.object_of(v, kind)?;
         // SAFETY: H3: a record has `len` values after its header; H5: the first `N` of them are borrowed with
-        // the heap, mutably, so nobody else sees them.
+        // the heap, mutably, so nothing else refers to them.
         let slots = unsafe {
             if N > (*object).len as usize {
                 return None;

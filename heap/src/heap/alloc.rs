@@ -325,7 +325,7 @@ impl Heap {
         self.limit_for_all()
     }
 
-    /// Returns the number of bytes that may be taken from the system by who runs no cleanup.
+    /// Returns the number of bytes that code outside cleanups may take from the system.
     fn limit_for_all(&self) -> usize {
         if self.reserve_open { self.limit.saturating_add(super::RESERVE) } else { self.limit }
     }

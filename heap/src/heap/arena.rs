@@ -156,10 +156,10 @@ impl Arena {
     /// Returns the objects of a block, as bytes.
     ///
     /// # Safety
-    /// The arena was made zeroed, and nobody uses an object of the block while the slice lives.
+    /// The arena was made zeroed, and no object of the block is used while the slice lives.
     pub(super) unsafe fn objects_mut(&mut self, block: usize) -> &mut [u8] {
         // SAFETY: invariant 1: the arena is live; by the contract all of it is initialised, since objects
-        // are, and nobody else refers to the block; the slice borrows the arena mutably.
+        // are, and nothing else refers to the block; the slice borrows the arena mutably.
         unsafe {
             let start: *mut u8 = std::ptr::with_exposed_provenance_mut(self.address(block));
             std::slice::from_raw_parts_mut(start, BLOCK)
@@ -263,10 +263,10 @@ pub(super) fn metadata_of(address: usize) -> *mut u8 {
 /// Writes a value that no program has over granules of the block at `address`.
 ///
 /// # Safety
-/// Nobody will read the granules before they are allocated again.
+/// The granules are not read before they are allocated again.
 unsafe fn poison(address: usize, granules: Range<usize>) {
     let start = std::ptr::with_exposed_provenance_mut::<u64>(address + granules.start * GRANULE);
-    // SAFETY: the granules lie in one block of a live arena, and by the contract nobody else uses them.
+    // SAFETY: the granules lie in one block of a live arena, and by the contract nothing else uses them.
     unsafe {
         for i in 0..granules.len() * (GRANULE / 8) {
             start.add(i).write(crate::value::Value::POISON.bits());

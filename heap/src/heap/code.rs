@@ -70,7 +70,7 @@ impl Heap {
     /// Sets where code made from now on begins to run; `None` for its first word.
     ///
     /// # Safety
-    /// What stands there may run in place of any code, with its frame.
+    /// The code at `entry` may run in place of any code, with that code's frame.
     pub unsafe fn set_code_entry(&mut self, entry: Option<&'static u32>) {
         self.code_entry = entry;
     }

@@ -59,7 +59,7 @@ impl Heap {
 
     /// Notes that a part of what `holder` has takes `after` bytes instead of `before`.
     pub fn recount_external(&mut self, holder: Holder, before: usize, after: usize) {
-        // It is too much or not: whoever asked for it has checked.
+        // The limit is not checked here: the code that requested the bytes has checked it.
         for count in [&mut self.external.held[holder as usize], &mut self.external.total] {
             *count = count.saturating_sub(before).saturating_add(after);
         }

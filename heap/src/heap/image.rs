@@ -165,8 +165,8 @@ impl Heap {
                 kept.contents.get(page).cloned()
             };
             let kept: Vec<Option<Arc<Page>>> = (0..numbers.len()).map(kept).collect();
-            // SAFETY: the heap has images, so the object was made zeroed; its header is its own, and nobody
-            // else has the heap.
+            // SAFETY: the heap has images, so the object was made zeroed; its header is its own, and the heap
+            // is borrowed mutably.
             let bytes = unsafe { object.bytes_mut() };
             let mut kept = kept.into_iter();
             let pages = bytes.chunks(PAGE).enumerate().map(|(page, bytes)| match kept.next().flatten() {
@@ -205,7 +205,7 @@ impl Heap {
     /// happens.
     ///
     /// # Safety
-    /// From now on nobody uses a value that has come into being since the image was taken.
+    /// From now on no value is used that was created after the image was taken.
     #[must_use]
     pub unsafe fn restore(&mut self, image: &HeapImage) -> bool {
         if !Arc::ptr_eq(&image.identity, &self.identity) {
@@ -306,7 +306,7 @@ fn block_image(
         let (from, to) = (address + page * PAGE, address + (page + 1) * PAGE);
         unused.iter().any(|range| range.start <= from && to <= range.end)
     };
-    // SAFETY: the heap has images, so the arena was made zeroed, and nobody else has the heap.
+    // SAFETY: the heap has images, so the arena was made zeroed, and the heap is borrowed mutably.
     let bytes = unsafe { arena.objects_mut(block) };
     let bytes = |page: usize| &bytes[page * PAGE..(page + 1) * PAGE];
     let is_same: [bool; BLOCK_PAGES] = std::array::from_fn(|page| match old.map(|old| &old.pages[page]) {
@@ -342,7 +342,7 @@ fn restore_arena(now: Option<Arena>, image: &ArenaImage) -> Arena {
             continue;
         };
         contents.metadata.put(arena.metadata_mut(block));
-        // SAFETY: the heap has images, so the arena was made zeroed, and nobody else has the heap.
+        // SAFETY: the heap has images, so the arena was made zeroed, and the heap is borrowed mutably.
         let bytes = unsafe { arena.objects_mut(block) };
         for (page, bytes) in contents.pages.iter().zip(bytes.chunks_exact_mut(PAGE)) {
             if let Some(page) = page {

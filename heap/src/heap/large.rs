@@ -122,13 +122,13 @@ impl LargeObject {
     /// Returns the object with this memory, which has this header and pages of these numbers again.
     ///
     /// # Safety
-    /// The header is one that this object has had, and nobody borrows the object.
+    /// The header is one that this object has had, and the object is not borrowed.
     pub(super) unsafe fn again(
         memory: &Arc<LargeMemory>,
         header: LargeHeader,
         numbers: Vec<u64>,
     ) -> LargeObject {
-        // SAFETY: the memory is live, begins with the header, and by the contract nobody borrows it.
+        // SAFETY: the memory is live, begins with the header, and by the contract is not borrowed.
         unsafe { memory.start.write(header) };
         LargeObject { start: memory.start, memory: memory.clone(), numbers }
     }
@@ -141,10 +141,10 @@ impl LargeObject {
     /// Returns the object proper, as bytes.
     ///
     /// # Safety
-    /// The object was made zeroed, its header tells its bytes, and nobody uses it while the slice lives.
+    /// The object was made zeroed, its header states its bytes, and it is not used while the slice lives.
     pub(super) unsafe fn bytes_mut(&mut self) -> &mut [u8] {
         let bytes = self.header().bytes - footprint(0);
-        // SAFETY: so many bytes follow the header; by the contract they are initialised and nobody else
+        // SAFETY: so many bytes follow the header; by the contract they are initialised and nothing else
         // refers to them.
         unsafe { std::slice::from_raw_parts_mut(self.object().as_ptr(), bytes) }
     }

@@ -75,7 +75,7 @@ pub enum Kind {
     Bignum = 0x41,
     /// Words of 64 bits, for indexes.
     Words64 = 0x42,
-    /// A large simple vector under construction. Nobody reads its elements before all are filled.
+    /// A large simple vector under construction. Its elements are not read before all are filled.
     UnfinishedVector = 0x43,
     /// A string: code points of 32 bits.
     String = 0x50,

@@ -401,7 +401,7 @@ impl Heap {
     /// # Safety
     /// The contract of [`Heap::end_marking`], for what `mark_roots` marks.
     pub unsafe fn collect_fully(&mut self, mark_roots: impl FnOnce(&mut Heap)) {
-        // SAFETY: by the contract `mark_roots` marks what somebody will use.
+        // SAFETY: by the contract `mark_roots` marks every value that will be used.
         unsafe { self.collect_fully_and_tell(mark_roots, |_| {}) }
     }
 
@@ -424,8 +424,8 @@ impl Heap {
         mark_roots(self);
         while let SliceOutcome::More = self.follow(&mut i64::from(u32::MAX)) {}
         tell(self);
-        // SAFETY: by the contract, `mark_roots` has marked what somebody will use, and all that it leads to
-        // was followed.
+        // SAFETY: by the contract, `mark_roots` has marked every value that will be used, and everything
+        // reachable from those was followed.
         unsafe { self.end_marking() };
         self.finish_sweep();
     }

@@ -27,7 +27,7 @@
 //!   and neither changes while the object lives, but for the kind of an unfinished vector or string.
 //! * **H4, contents.** The name of a symbol is a String and its function a Function; the code of a function
 //!   is a Code; the class of a structure is a Class; the data of an array is a SimpleVector, a String or
-//!   Bytes. A hash table has the storage that [`crate::table`] says, and nobody else has it. Allocation and
+//!   Bytes. A hash table has the storage that [`crate::table`] says, and is its only owner. Allocation and
 //!   setters test all this.
 //! * **H5, borrows.** Access borrows the heap, so nothing is stored or collected while a slice of it is in
 //!   use. Every store of a value passes the write barrier.
@@ -41,7 +41,7 @@
 //! Sweeping   slice
 //! ```
 //!
-//! There are three sorts of roots. *Fixed* roots are marked when the cycle begins; whoever overwrites one
+//! There are three kinds of roots. *Fixed* roots are marked when the cycle begins; code that overwrites one
 //! later first calls [`Heap::log_if_marking`] with the old value. *Stacks* are scanned once per cycle, before
 //! their task runs in it (`mark` says why that is sound). Roots that are *few and change often* may be marked
 //! at the beginning and all again before the end.
@@ -211,7 +211,7 @@ pub struct Heap {
 
     /// Whether images may be taken.
     has_images: bool,
-    /// What tells its images from those of other heaps.
+    /// Tells its images from those of other heaps.
     identity: Arc<()>,
     /// Greatest number of a page of a vector that is the machine's own ([`Heap::own_vector`]).
     numbered: u64,
@@ -383,9 +383,9 @@ impl Heap {
         self.reserve_open = false;
     }
 
-    /// Lets those who allocate from now on use what is kept above the limit for cleanups, or no longer. What
-    /// is left of it is out of reach of others: arenas that were taken from it are theirs only once the heap
-    /// is within its limit again.
+    /// Opens or closes the reserve above the limit, which is kept for cleanups, to allocations from now on.
+    /// Other code cannot use the rest of the reserve: it gets arenas taken from the reserve only once the
+    /// heap is within its limit again.
     #[inline]
     pub fn lend_to_cleanup(&mut self, lends: bool) {
         if lends != self.lent_to_cleanup {

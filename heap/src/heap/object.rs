@@ -156,7 +156,7 @@ impl Heap {
         let object = self.allocate_large(bytes, true)?.as_ptr().cast::<Header>();
         // SAFETY: `allocate_large` gave us at least 16 aligned bytes of our own.
         unsafe { object.write(Header { kind, flags: 0, aux: 0, len: len as u32 }) };
-        // SAFETY: nobody reads the elements of an unfinished object: the collector does not look inside, and
+        // SAFETY: the elements of an unfinished object are not read: the collector does not scan them, and
         // `access` has nothing for these kinds. They are zero, which is an element of either kind.
         Ok(unsafe { Value::from_object(object) })
     }
@@ -402,7 +402,7 @@ mod tests {
         assert_eq!(heap.fill_more(v, Value::NIL, 1), None);
     }
 
-    /// A value that is found nowhere else must not be in there: nobody looks inside until the object is
+    /// An unfinished object must not hold the only reference to a value: it is not scanned until it is
     /// finished.
     #[test]
     fn nothing_with_an_address_is_filled_in() {

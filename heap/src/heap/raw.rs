@@ -30,8 +30,8 @@ impl Heap {
         part: impl for<'a> Fn(&'a Heap, usize) -> &'a [u32],
     ) -> Result<Value, AllocError> {
         let object = self.begin_object(Kind::String, 0, 0, len)?;
-        // SAFETY: `begin_object` gave room for `len` code points, which nobody else can reach before the
-        // value is made; all are written by then.
+        // SAFETY: `begin_object` gave room for `len` code points, which are unreachable until the value is
+        // made; all are written by then.
         unsafe {
             let characters = object.add(1).cast::<u32>();
             let mut written = 0;
@@ -212,7 +212,7 @@ impl Heap {
         debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
         let object = self.object_of(v, kind)?;
         // SAFETY: H3: a raw object has `len` elements of this size, of a type without invalid patterns; H5:
-        // the heap is borrowed mutably, so nobody else sees them.
+        // the heap is borrowed mutably, so nothing else refers to them.
         Some(unsafe { slice::from_raw_parts_mut(object.add(1).cast(), (*object).len as usize) })
     }
 }

@@ -21,8 +21,9 @@ const BYTES_PER_VISIT: usize = 256;
 const FREE_PIECE: usize = 64 << 10;
 /// Least allocation, in bytes, between two cycles, however close the limit is.
 const LEAST_THRESHOLD: u64 = 256 << 10;
-/// Least allocation between two cycles, as a part of what they go over, one in so many: below that they would
-/// take all the time, and who finds no room had better wait for one.
+/// Least allocation between two cycles, as a fraction of the memory that they trace and sweep, one in so
+/// many: with less, cycles would take all the time, so an allocation that finds no room had better wait for
+/// one.
 const WORTH: u64 = 32;
 
 /// Progress of the sweep.

@@ -198,7 +198,8 @@ impl Table {
     }
 
     fn advance(self, heap: &mut Heap) {
-        // Nobody waits for as many changes as there are fixnums.
+        // A counter of changes does not run through all fixnums, so wrapping around repeats no serial number
+        // in use.
         let next = self.serial(heap).wrapping_add(1) & (Value::FIXNUM_MAX as usize);
         heap.table_set_counter(self.0, Counter::Serial, next);
     }

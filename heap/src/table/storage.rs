@@ -11,8 +11,8 @@
 //! segment grows, by doubling, so nothing here takes time in proportion to the size of a table.
 //!
 //! Invariant: the segments in the directories hold `room` entries and [`PER_ENTRY`] heads for each of them,
-//! `used` is at most `room`, and nobody else has the directories or segments. So every entry with a number
-//! below `used` is there, and every head with one below `Storage::heads`.
+//! `used` is at most `room`, and no other object has the directories or segments. So every entry with a
+//! number below `used` is there, and every head with one below `Storage::heads`.
 //!
 //! Not here: the content of entries, and how keys are found ([`super`]).
 
@@ -314,8 +314,9 @@ impl Heap {
         if room < SEGMENT {
             let entries = self.alloc_vector_filled(2 * ENTRY * room, FREE)?;
             let heads = self.alloc_words64(2 * PER_ENTRY * room)?;
-            // SAFETY: the first segments have room for `room` entries, the new ones for twice as many; nobody
-            // else has the new ones, so the barrier has no work but where the directories are changed.
+            // SAFETY: the first segments have room for `room` entries, the new ones for twice as many; no
+            // other object has the new ones, so the barrier has no work but where the directories are
+            // changed.
             unsafe {
                 let (from_entries, from_heads) =
                     (elements::<Value>(old_entries), elements::<Value>(old_heads));

@@ -44,12 +44,12 @@ enum Shade {
     Plain(Value),
 }
 
-/// What the shadow knows of an object.
+/// The shadow of an object.
 struct Shadow {
     value: Value,
     /// `None` is a cons.
     kind: Option<Kind>,
-    /// What is traced, in the order of the layout.
+    /// The traced slots, in the order of the layout.
     slots: Vec<Shade>,
     /// Elements of a raw object; their contents follow from number and index.
     raw_len: usize,
@@ -79,7 +79,7 @@ struct Model {
     totals: Totals,
 }
 
-/// What shows that the test has come to the interesting places.
+/// Counters that show that the test has reached the interesting places.
 #[derive(Default, Debug)]
 struct Totals {
     /// Cycles that ended in the ordinary way.

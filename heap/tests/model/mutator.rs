@@ -1,4 +1,4 @@
-//! What a program does to the heap: it makes objects, stores, and forgets.
+//! The actions of a program on the heap: it makes objects, stores, and forgets.
 
 use super::*;
 
@@ -95,10 +95,10 @@ impl Model {
                     constants: &values[3..],
                     words: &raw,
                 };
-                // SAFETY: nobody runs this code.
+                // SAFETY: this code is not run.
                 unsafe { heap.alloc_code(parts) }
             }
-            // SAFETY: nobody runs the code of this function.
+            // SAFETY: the code of this function is not run.
             Kind::Function => unsafe { heap.alloc_function(values[0], &values[1..]) },
             Kind::Box => heap.alloc_box(values[0]),
             Kind::Structure => heap.alloc_structure(values[0], &values[1..]),
@@ -217,7 +217,7 @@ impl Model {
                 _ => None,
             },
             Some(Kind::Function) if index > 0 => {
-                // SAFETY: nobody runs the code of this function.
+                // SAFETY: the code of this function is not run.
                 unsafe { heap.function_set_capture(shadow.value, index - 1, value) }
             }
             Some(Kind::Structure) if index > 0 => heap.structure_set(shadow.value, index - 1, value),

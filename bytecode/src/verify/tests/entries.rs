@@ -37,7 +37,7 @@ fn v9_bindings_are_undone_by_the_frame_that_made_them() {
     check(&bound("push-scope r2.. \n bind r0 k0 \n pop-control 1 \n unbind 1"), Ok(()));
     check(&bound("push-scope r2.. \n unbind 1"), Err(Fault::UnbindCount(1)));
     check(&bound("push-scope r2.. \n pop-control 1 \n unbind 2"), Err(Fault::UnbindCount(2)));
-    // What a list has bound is undone with its scope.
+    // The end of a scope undoes the bindings of a list.
     let list = |code: &str| bound(&format!("push-scope r2.. \n bind r0 k0 \n bind-list r0 r1 \n {code}"));
     check(&list("bind r0 k0 \n unbind 1 \n pop-control 1 \n unbind 1"), Ok(()));
     check(&list("unbind 1"), Err(Fault::UnbindCount(1)));
@@ -82,7 +82,7 @@ fn v9_registers_survive_a_cleanup_entered_in_the_normal_way() {
     check(&format!("{} return r3", cleanup("call-global r4.. 0 want 1 k0")), Ok(()));
     check(&format!("{} return r3", cleanup("call-global r3.. 0 want 1 k0")), Err(window(3, 4)));
     check(&format!("{} return r0", cleanup("load-true r2 \n make-box r0 r2")), Err(Fault::Box(0)));
-    // What one of two paths through the cleanup destroys is gone.
+    // A register that one of two paths through the cleanup destroys is unassigned afterwards.
     let branch = cleanup("load-true r3 \n jump-if-nil r3 L2 \n call-global r4.. 0 want 1 k0 \n L2:");
     check(&format!("{branch} return r5"), Err(Fault::Unassigned(5)));
     check(&format!("{branch} return r2"), Ok(()));

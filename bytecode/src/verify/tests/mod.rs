@@ -106,7 +106,7 @@ fn v1_control_stays_within_instructions() {
     check("load-true r0 \n return r0", Ok(()));
     check("load-true r0", Err(Fault::FallsOff));
     check("load-true r0 \n jump-if-nil r0 L1 \n return r0 \n L1: load-true r1", Err(Fault::FallsOff));
-    // What control cannot get to may run off.
+    // Unreachable code may run off the end.
     check("load-true r0 \n return r0 \n load-true r1", Ok(()));
     check_header(|f| f.code.clear(), Err(Fault::CodeLength(0)));
     check_header(|f| f.code = vec![f.code[0]; MAX_CODE + 1], Err(Fault::CodeLength(MAX_CODE + 1)));
@@ -227,7 +227,7 @@ fn v6_registers_are_read_after_they_were_written() {
     check("list r0 r1.. 1 \n return r0", Err(Fault::Unassigned(1)));
     check("return-values r1.. 1", Err(Fault::Unassigned(1)));
     check("make-closure r1 k5 \n return r1", Err(Fault::Unassigned(0)));
-    // What a loop destroys is gone at its head.
+    // A register that a loop destroys is unassigned at its head.
     let body = "L1: move r1 r3 \n call-global r2.. 0 want 1 k0 \n loop-if-nil r2 L1 \n return r2";
     check(&format!("load-nil r0.. 4 \n {body}"), Err(Fault::Unassigned(3)));
 }

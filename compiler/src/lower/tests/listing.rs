@@ -1,4 +1,4 @@
-//! What forms are lowered to: one snapshot for each family of forms and each improvement, the source first.
+//! Listings of lowered forms: one snapshot for each family of forms and each improvement, the source first.
 //!
 //! `INSTA_UPDATE=always cargo test -p esl-compiler lower` writes them again.
 

@@ -17,12 +17,12 @@ use super::{ModuleBuilder, SourceLines, lower};
 use crate::core::Core;
 use crate::resolve::resolve;
 
-/// What a form is lowered to, verified.
+/// Lowers a form, and verifies the module.
 fn module(text: &str) -> Module {
     module_of(&notation::core_in_big_stack(text), text)
 }
 
-/// What a core tree is lowered to, verified.
+/// Lowers a core tree, and verifies the module.
 fn module_of(core: &Core, text: &str) -> Module {
     let module = lower(core, &SourceLines::new()).unwrap_or_else(|faults| panic!("{faults:?}\n{text}"));
     verified(module, text)
@@ -35,7 +35,7 @@ fn verified(module: Module, text: &str) -> Module {
     module
 }
 
-/// What a core tree is lowered to when nearly all variables go to the heap.
+/// Lowers a core tree with nearly all variables spilled to the heap, and verifies the module.
 fn spilled_module_of(core: &Core, text: &str) -> Module {
     let lines = SourceLines::new();
     let mut builder = ModuleBuilder::new(core, resolve(core), &lines);

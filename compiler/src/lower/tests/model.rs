@@ -66,7 +66,7 @@ enum Exit {
 
 type Outcome = Result<Vec<Value>, Exit>;
 
-/// What a run has done: its log and how it ended; `None` if it takes too long.
+/// Runs `core`, and returns its log and its end; `None` if it takes more than `steps`.
 pub(super) fn run(core: &Core, steps: u32) -> Option<(Vec<String>, String)> {
     let mut model =
         Model { core, steps, log: Vec::new(), globals: FxHashMap::default(), catches: Vec::new(), next: 0 };

@@ -87,7 +87,7 @@ impl<F> Value<F> {
         }
     }
 
-    /// What the simple builtins do, or the name of the condition with which they fail. `None` for other
+    /// Calls a simple builtin: its value, or the name of the condition with which it fails. `None` for other
     /// builtins.
     pub(super) fn apply_builtin(
         builtin: esl_bytecode::builtin::Builtin,

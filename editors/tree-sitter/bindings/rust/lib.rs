@@ -22,5 +22,5 @@ pub const LANGUAGE: LanguageFn = unsafe { LanguageFn::from_raw(tree_sitter_esl) 
 /// Colours.
 pub const HIGHLIGHTS_QUERY: &str = include_str!("../../queries/highlights.scm");
 
-/// What an editor can fold.
+/// Query for the parts that an editor can fold.
 pub const FOLDS_QUERY: &str = include_str!("../../queries/folds.scm");

@@ -24,7 +24,7 @@ pub(super) enum LoadedFunction {
 
 type Value = AnyValue<LoadedFunction>;
 
-/// What a register or a capture holds.
+/// The contents of a register or a capture.
 #[derive(Clone)]
 pub(super) enum Cell {
     Nothing,
@@ -91,7 +91,7 @@ pub(super) struct Interpreter<'a> {
     next: u64,
 }
 
-/// What a run has done, as [`super::model::run`] says it.
+/// Runs `module`, and returns its log and its end like [`super::model::run`].
 pub(super) fn run(module: &Module, steps: u32) -> Option<(Vec<String>, String)> {
     let mut interpreter = Interpreter {
         module,
@@ -240,7 +240,7 @@ impl Interpreter<'_> {
         if want == Want::ALL {
             self.values = values;
         } else {
-            // Whoever relied on the list would be wrong.
+            // Only `Want::ALL` fills the list. Code that reads it after any other call gets this wrong value.
             self.values = vec![Value::Symbol(Symbol::cl("STALE"))];
         }
     }
