@@ -832,7 +832,7 @@ macro_rules! for_each_builtin {
             /// The array to which `array` is displaced, and the index of its first element there; `NIL` and 0
             /// if there is none.
             Displacement = array::displacement, cl "ARRAY-DISPLACEMENT" ("array");
-            /// What the elements may be: 0 any objects, 1 characters, 2 integers below 256, 3 bits.
+            /// The kind of the elements: 0 any objects, 1 characters, 2 integers below 256, 3 bits.
             ElementSort = array::element_sort, internal "%ELEMENT-SORT" ("array") -> one;
             /// A vector of `size` times `byte`, of bits if `bits-p`.
             MakeBytes = array::make_bytes, internal "%MAKE-BYTES" ("size byte bits-p") -> one;
@@ -841,7 +841,7 @@ macro_rules! for_each_builtin {
             /// and b.
             BitOperation = array::bit_operation, internal "%BIT-OPERATION"
                 ("operation left right target start") -> one;
-            /// What keeps the elements: a simple vector or string, the array itself if it is one.
+            /// The storage of the elements: a simple vector or string, the array itself if it is one.
             ArrayData = array::array_data, internal "%ARRAY-DATA" ("array");
             /// The fill pointer of a vector.
             FillPointer = array::fill_pointer, cl "FILL-POINTER" ("vector");
@@ -930,15 +930,15 @@ macro_rules! for_each_builtin {
             /// The innermost handlers below `height`, or of all if that is `NIL`, that no mask hides: index
             /// of the entry, its kind, and what goes with it: `:functions` and a list of `(type . function)`,
             /// `:cases` and their types; for a `failure`, its condition or cause, also `:recovery` and the
-            /// table or state of recovery procedures, or `:cleanup`. `NIL` if there are none. Those who watch
-            /// the run are told of a failure for which all are searched.
+            /// table or state of recovery procedures, or `:cleanup`. `NIL` if there are none. A search
+            /// through all entries notifies the observers of the failure.
             NextHandler = failure::next_handler, internal "%NEXT-HANDLER" ("height failure");
             /// Unwinds to the entry with this index, of the cases of a `handler-case`, and has one of them
             /// take the condition.
             TakeCase = failure::take_case, internal "%TAKE-CASE" ("index case condition");
             /// The state of the recovery procedures of the entry with this index: `table` if it is one,
-            /// otherwise a copy of it, made here, with their function first. Those who watch the run are told
-            /// that there is recovery from `failure`.
+            /// otherwise a copy of it, made here, with their function first. Notifies the observers of the
+            /// recovery from `failure`.
             BeginRecovery = failure::begin_recovery, internal "%BEGIN-RECOVERY" ("index table failure");
             /// Has `values`, a list, stand for the values of the operation for whose failure this function of
             /// the library was called, and that the recovery procedures of the entry `index` have handled: if
@@ -948,7 +948,7 @@ macro_rules! for_each_builtin {
             IsCalledByLibrary = failure::is_called_by_library, internal "%IS-CALLED-BY-LIBRARY" ("");
             /// Unwinds to the cleanup for failures with this index, which has `failure` when it has run.
             UnwindToCleanup = failure::unwind_to_cleanup, internal "%UNWIND-TO-CLEANUP" ("index failure");
-            /// What the innermost running cleanup was given by `%UNWIND-TO-CLEANUP`, or `NIL`.
+            /// The failure that `%UNWIND-TO-CLEANUP` has passed to the innermost running cleanup, or `NIL`.
             CleaningUp = failure::cleaning_up, internal "%CLEANING-UP" ("");
             /// Returns true if it is reported when the running task fails: unless it belongs to a form, which
             /// is told of its end, or in a cleanup while it ends.
@@ -984,7 +984,7 @@ macro_rules! for_each_builtin {
             /// Calls the embedder's function of this name, a symbol, with a list of arguments.
             CallHost = outside::call_host, internal "%CALL-HOST" ("name arguments");
             /// Begins the embedder's operation of this name, a symbol, with a list of arguments; its handle.
-            /// Nobody waits until a detached one has stopped.
+            /// A call that is left does not wait until a detached one has stopped.
             BeginOperation = operation::begin_operation, internal "%BEGIN-OPERATION" ("name arguments detached");
             /// Tells the outside that this task, whose operations are under way there, stands still, or goes
             /// on.
@@ -993,7 +993,7 @@ macro_rules! for_each_builtin {
             MayAwait = operation::may_await, internal "%MAY-AWAIT" ("name");
             /// Tells the outside to stop an operation, once.
             CancelOperation = operation::cancel_operation, internal "%CANCEL-OPERATION" ("handle");
-            /// What has become of an operation: a keyword, and the list of its values or of the cause and the
+            /// The state of an operation: a keyword, and the list of its values or of the cause and the
             /// arguments of its failure.
             OperationState = operation::operation_state, internal "%OPERATION-STATE" ("handle");
             /// The values of the latest report of an operation on its progress, a list.
@@ -1109,7 +1109,7 @@ macro_rules! for_each_builtin {
             ExternalSymbols = package::external_symbols, internal "%EXTERNAL-SYMBOLS" ("package");
             /// All symbols that are accessible in a package, by name.
             AccessibleSymbols = package::accessible_symbols, internal "%ACCESSIBLE-SYMBOLS" ("package");
-            /// What is written before the name of a symbol in the current package: a string such as `:`, or
+            /// The qualifier before the name of a symbol in the current package: a string such as `:`, or
             /// `NIL`.
             SymbolQualifier = package::symbol_qualifier, internal "%SYMBOL-QUALIFIER" ("symbol");
 
@@ -1132,7 +1132,7 @@ macro_rules! for_each_builtin {
             ClassSupers = class::class_supers, internal "%CLASS-SUPERS" ("class");
             /// The names of the slots of a class, inherited ones first.
             ClassSlots = class::class_slots, internal "%CLASS-SLOTS" ("class");
-            /// What the library keeps about a class.
+            /// The library's data about a class.
             ClassData = class::class_data, internal "%CLASS-DATA" ("class");
             /// Makes `data` what the library keeps about a class, and returns it.
             SetClassData = class::set_class_data, internal "%SET-CLASS-DATA" ("class data");
@@ -1190,7 +1190,7 @@ macro_rules! for_each_builtin {
             /// A handle of a text that is compiled form by form. Functions of a text with a name know where
             /// they stand in it.
             OpenText = eval::open_text, internal "%OPEN-TEXT" ("text &optional name");
-            /// What is left of a text that is compiled form by form, which ends with this.
+            /// The remaining text of a compilation form by form, which ends with this.
             TextRest = eval::text_rest, internal "%TEXT-REST" ("handle");
             /// A handle of the compilation of the next form of a text, `NIL` at its end.
             NextForm = eval::next_form, internal "%NEXT-FORM" ("handle");
@@ -1223,7 +1223,7 @@ macro_rules! for_each_builtin {
             /// A stream that reads the characters of `string` from `start` to before `end`.
             MakeStringInput = stream::make_string_input, internal "%MAKE-STRING-INPUT" ("string start end")
                 slowly "%SLOW-MAKE-STRING-INPUT";
-            /// A stream that reads from `string`, which nobody else may have.
+            /// A stream that reads from `string`, which it owns from now on.
             ReadFromCopy = stream::read_from_copy, internal "%READ-FROM-COPY" ("string");
             /// How many characters such a stream has read; if `as_rest`, how many bytes in UTF-8 are left of
             /// those that it has.
@@ -1235,7 +1235,7 @@ macro_rules! for_each_builtin {
                 internal "%SET-STRING-INPUT-POSITION" ("stream position");
             /// A stream that gathers what is written to it.
             MakeStringOutput = stream::make_string_output, internal "%MAKE-STRING-OUTPUT" ("");
-            /// What a string stream has gathered since this was last asked.
+            /// The characters that a string stream has gathered since the last call.
             GetOutputStreamString = stream::get_output_stream_string, cl "GET-OUTPUT-STREAM-STRING" ("stream")
                 slowly "%SLOW-GET-OUTPUT-STREAM-STRING";
             /// How many characters a string stream has gathered since it was last asked for them.
@@ -1474,7 +1474,7 @@ macro_rules! for_each_builtin {
             RequestAtOnce = coordination::request_at_once, internal "%REQUEST-AT-ONCE"
                 ("name amount priority outer");
             /// Takes from a request, if that is not `NIL`, what it holds: a claim of one resource alone, if
-            /// nobody waits for that. Whether the request holds nothing now.
+            /// no request waits for that. Whether the request holds nothing now.
             GiveBackAtOnce = coordination::give_back_at_once, internal "%GIVE-BACK-AT-ONCE" ("request");
 
             // ---- tasks
@@ -1523,12 +1523,12 @@ macro_rules! for_each_builtin {
             AddCheckpoint = task::add_checkpoint, internal "%ADD-CHECKPOINT" ("id");
             /// The checkpoints that a task has passed, newest first.
             Checkpoints = task::checkpoints, internal "%CHECKPOINTS" ("task");
-            /// What the running task holds: the list that `%SET-HELD` has noted last.
+            /// The holdings of the running task: the list that `%SET-HELD` has noted last.
             Held = task::held, internal "%HELD" ("");
             /// Notes a list of what the running task holds. At its end, before others are told of that, the
             /// task calls `%RELEASE-HELD` as long as the list is not empty.
             SetHeld = task::set_held, internal "%SET-HELD" ("list");
-            /// What lets the end of another task interrupt this one with a call of `function`.
+            /// A guard by which the end of another task interrupts this one with a call of `function`.
             MakeGuard = task::make_guard, internal "%MAKE-GUARD" ("function");
             /// Interrupts a task, as soon as none of its cleanups runs, with a call of `function`.
             InterruptTask = task::interrupt_task, internal "%INTERRUPT-TASK" ("task function");

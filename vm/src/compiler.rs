@@ -134,7 +134,7 @@ pub(crate) struct Compilations {
     pub(crate) unit: RefCell<Unit>,
     /// Errors of the form of a nameless text that was refused last, for the embedder.
     pub(crate) refused: Vec<Diagnostic>,
-    /// What is left of jobs that have ended.
+    /// Units of ended jobs that are still to be freed.
     pub(crate) remains: Vec<UnitRemains>,
     /// Number of jobs so far.
     pub(crate) begun: u64,

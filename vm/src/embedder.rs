@@ -18,7 +18,7 @@ pub(crate) struct Embedder {
     pub(crate) calls: BTreeMap<TaskIndex, u64>,
     /// The call from outside that goes first, while what has come after it is deferred.
     pub(crate) first: Option<TaskId>,
-    /// What is deferred, in the order in which it has come.
+    /// The deferred arrivals, in their order.
     pub(crate) deferred: VecDeque<Incoming>,
     /// Values that the outside holds, by number.
     pub(crate) kept: BTreeMap<u64, Value>,

@@ -1,4 +1,4 @@
-//! What passes between the interpreter and builtins beside arguments and results.
+//! Data that pass between the interpreter and builtins beside arguments and results.
 //!
 //! A builtin gets the machine and its arguments and returns an [`Outcome`](crate::raise::Outcome). Whatever
 //! else it has to say (the failure behind an [`Exit::Raise`], the values behind an [`Exit::Values`], the call
@@ -72,7 +72,7 @@ pub(crate) struct Exchange {
     pub(crate) raised: Option<Raised>,
     /// Call requested by a builtin: the function, then its arguments.
     pub(crate) requested_call: Vec<Value>,
-    /// What searches in hash tables have found lately.
+    /// The latest results of searches in hash tables.
     pub(crate) lookups: Lookups,
     /// Charges of builtins, until the interpreter takes them.
     pub(crate) charges: Charges,

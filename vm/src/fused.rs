@@ -7,7 +7,7 @@
 //! Only the number in the first word of a sequence is changed; its operands and the words behind it stay.
 //! Therefore:
 //!
-//! * whoever asks for the opcode of a word in loaded code gets that of the first part, by [`original`];
+//! * code that reads the opcode of a word in loaded code gets that of the first part, by [`original`];
 //! * a part that cannot be done in the fast way is done as the instruction that it is: a fused instruction
 //!   that has done some of its parts goes on at the word of the next one;
 //! * a jump may lead behind the first part.

@@ -50,7 +50,7 @@ enum Way {
     Search,
 }
 
-/// What searches in hash tables have found lately.
+/// The latest results of searches in hash tables.
 #[derive(Debug, Default)]
 pub(crate) struct Lookups {
     /// The entry found last.
@@ -254,7 +254,7 @@ mod tests {
         assert!(table.delete(&mut heap, entry, hash));
         assert_eq!(find(&mut lookups, &heap, table, keys[0]), (None, true));
         assert_eq!(find(&mut lookups, &heap, table, keys[1]), (Some(Value::index(1)), true));
-        // What takes the place of the key is not taken for it.
+        // Another key in the same entry is not taken for the first.
         let hash = equality::hash(&heap, KeyTest::Equal, another);
         table.add(&mut heap, hash, another, Value::T).expect("there is room");
         assert_eq!(find(&mut lookups, &heap, table, keys[0]), (None, true));

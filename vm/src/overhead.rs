@@ -11,7 +11,7 @@ const PART_OF_LIMIT: u64 = 64;
 /// So many collections are allowed in advance.
 const ALLOWED: u64 = 16;
 
-/// What is known when a collection is wanted.
+/// The state of the run when a collection is requested.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CollectionPoint {
     /// Ticks of the machine so far.

@@ -108,7 +108,8 @@ pub type Outcome = Result<Value, Exit>;
 impl From<AllocError> for Exit {
     fn from(error: AllocError) -> Exit {
         match error {
-            // What is too large will still be so after a collection; then the heap counts as exhausted.
+            // An object that is too large will still be so after a collection; then the heap counts as
+            // exhausted.
             AllocError::NeedCollection | AllocError::TooLarge { .. } => Exit::Collect,
         }
     }

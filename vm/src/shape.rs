@@ -1,4 +1,4 @@
-//! What the interpreter has to know of a Code beside its words: which sort it is, and what it takes.
+//! The kind and the parameters of a Code, which the interpreter needs beside its words.
 //!
 //! A [`Shape`] is packed into `Code::spare[0]`; `Code::spare[1]` is the number of captures. The loader lays a
 //! Code out so:
@@ -25,9 +25,9 @@ pub(crate) enum Sort {
     Bytecode = 0,
     /// A builtin: its number is in the shape.
     Native = 1,
-    /// What a symbol without a function holds.
+    /// The placeholder in a symbol without a function.
     Undefined = 2,
-    /// A function of a loaded module that nobody has called yet: `owner` says which.
+    /// A function of a loaded module that has not been called yet: `owner` says which.
     Lazy = 3,
 }
 

@@ -58,7 +58,7 @@ struct SavedOutside {
     exit_status: Option<u8>,
 }
 
-/// What lies in the exchange between two turns.
+/// The contents of the exchange between two turns.
 struct SavedExchange {
     values: Vec<Value>,
     lookups: Lookups,

@@ -4,15 +4,15 @@
 //! database in `database`), so a new field does not compile until it is listed in one of these groups:
 //!
 //! * `content`: state of the run that decides what programs may still do, so it belongs to every fingerprint.
-//!   The list makes a trait with a method for each of these fields, which whoever visits a state implements:
-//!   a field that is not visited does not compile either.
+//!   The list makes a trait with a method for each of these fields, which visitors of a state implement: a
+//!   field that is not visited does not compile either.
 //! * `course`: state of the run that says how it came here, and decides when things happen: ticks, numbers,
 //!   the order of queues. Two states that differ here only are one to the explorer; the strict fingerprint is
 //!   made of it too, as the list tells it, by the function behind `by` if there is one.
 //! * `parts`: made of structs that are listed themselves.
 //! * `transient`: without meaning while no task runs. A state is one between two turns.
 //! * `derived`: follows from other fields, and is kept to save time.
-//! * `process`: belongs to the process: an address, a handle, a setting of those who watch.
+//! * `process`: belongs to the process: an address, a handle, a setting of observers.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, VecDeque};
@@ -37,13 +37,13 @@ use crate::vm::Vm;
 use crate::wait::Deliveries;
 use crate::world::{Opaques, RootMap, World};
 
-/// What those who visit content do with the course: the fields that tell themselves.
+/// The part of a visitor of content that handles the course: the fields that describe themselves.
 pub(crate) trait VisitCourse {
     /// Visits the course of a struct.
     fn course(&mut self, whole: &dyn Stated);
 }
 
-/// Lists the fields of a struct by groups, and declares the trait of those who visit its content.
+/// Lists the fields of a struct by groups, and declares the trait of visitors of its content.
 macro_rules! state {
     ($(#[$doc:meta])* $owner:ident by $visitor:ident :: $visit:ident {
         content { $($content:ident),* $(,)? }

@@ -42,7 +42,7 @@ pub struct TierReport {
 /// The machine code of a machine's functions.
 #[derive(Default)]
 pub(crate) struct CompiledFunctions {
-    /// What was asked for.
+    /// The requested tier.
     pub(crate) tier: Tier,
     /// Figures.
     pub(crate) report: TierReport,
@@ -52,7 +52,7 @@ pub(crate) struct CompiledFunctions {
     /// Makes machine code on a thread of its own: for [`Tier::Auto`].
     #[cfg(feature = "native")]
     pub(crate) helper: Option<MachineCodeHelper>,
-    /// What machine code was asked for, by the number of the order.
+    /// The open orders, by number.
     #[cfg(feature = "native")]
     pub(crate) asked: HashMap<u64, CodeOrder>,
     /// Number of the last order.
@@ -64,7 +64,7 @@ pub(crate) struct CompiledFunctions {
     /// The numbers that were given back.
     #[cfg(feature = "native")]
     pub(crate) free: Vec<u32>,
-    /// What was met of codes.
+    /// Counters of hot codes.
     #[cfg(feature = "native")]
     pub(crate) heat: Heat,
     /// The symbols, by their words, whose functions were inlined and then redefined: these are not inlined
@@ -84,8 +84,8 @@ pub(crate) struct CodeOrder {
     pub(crate) inlined: Box<[u64]>,
 }
 
-/// What was met of codes. One that was not met for long may be forgotten for another, so this takes little
-/// memory, and to find a code in it little time.
+/// Counters of hot codes. A code that has not run for long may be evicted for another, so the table takes
+/// little memory, and finding a code in it little time.
 #[cfg(feature = "native")]
 #[derive(Default)]
 pub(crate) struct Heat {
@@ -195,11 +195,11 @@ impl SeenRegister {
 /// Machine code that calls may enter.
 #[cfg(feature = "native")]
 pub(crate) struct InstalledCode {
-    /// What the entry word of the code points to. It stays where it is.
+    /// The target of the code's entry word, which does not move.
     pub(crate) stub: Box<EntryStub>,
     /// The machine code.
     pub(crate) made: MachineCode,
-    /// What was asked for.
+    /// The order that it was made for.
     pub(crate) order: CodeOrder,
     /// How often guesses were wrong.
     pub(crate) wrong: u32,

@@ -20,7 +20,7 @@ use crate::value::Value;
 /// The code of a symbol without a function; the symbol is capture 0 of the function. As the next two, it
 /// never runs: the interpreter goes by the shape.
 pub(crate) const UNDEFINED_WORD: u32 = 0xC1;
-/// The code of a function that nobody has called yet: the loader puts its real code in place of this.
+/// The code of a function that has not been called yet: the loader puts its real code in place of this.
 pub(crate) const LAZY_WORD: u32 = 0xC2;
 
 /// Returns the code of a builtin, its number above the operation.
@@ -31,7 +31,7 @@ pub(crate) const fn native_word(builtin: Builtin) -> u32 {
 /// Creates the heap of a machine.
 pub(crate) fn new_heap(config: HeapConfig) -> Heap {
     // SAFETY: a machine uses the values of its heap with no other, and drops both together. The documentation
-    // of `Vm` asks the same of an embedder who gets hold of values.
+    // of `Vm` requires the same of an embedder that gets hold of values.
     unsafe { Heap::new(config) }
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn restore_heap(heap: &mut Heap, image: &HeapImage) -> bool {
     unsafe { heap.restore(image) }
 }
 
-/// Creates a vector of nothing yet for the loader of images, who hands it to nobody and changes it by
+/// Creates a vector of nothing yet for the loader of images, which does not pass it on and changes it by
 /// [`Heap::own_vector_set`].
 ///
 /// # Errors
@@ -168,7 +168,7 @@ fn is_bytecode(heap: &Heap, function: Value) -> Option<bool> {
     Some(Shape::unpack(code.spare[0]).sort == Sort::Bytecode)
 }
 
-/// Creates a function of code that reads no captures. The captures of a stub are for whoever replaces it.
+/// Creates a function of code that reads no captures. The code that replaces a stub reads its captures.
 ///
 /// # Errors
 /// As for every allocation.

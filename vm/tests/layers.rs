@@ -1,6 +1,6 @@
 //! The layers of the machine: each module of `vm/src` uses only modules that come before it in the list.
 //!
-//! What counts is a path that begins with `crate::`, and a call of a method that a module adds to `Vm`. Unit
+//! A use is a path that begins with `crate::`, or a call of a method that a module adds to `Vm`. Unit
 //! tests may use everything. The modules that `lib.rs` takes from the heap's crate are below all others and
 //! need no mention.
 
@@ -40,7 +40,7 @@ const LAYERS: &[&str] = &[
     "vm",
     "state",
     "snapshot",
-    // What happens to the machine as a whole.
+    // Operations on the machine as a whole.
     "number",
     "types",
     "interp",

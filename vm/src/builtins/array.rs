@@ -1,6 +1,6 @@
 //! Arrays: their elements, dimensions and fill pointers.
 //!
-//! What keeps the elements decides what they may be: any value, characters, integers below 256, or bits.
+//! The storage decides the kind of the elements: any values, characters, integers below 256, or bits.
 //! [`esl_heap::array`] reads them.
 
 pub(crate) use esl_heap::array::{ArrayElements, all_elements, storage, vector_elements, vector_length};
@@ -22,7 +22,7 @@ const FILLED_AT_ONCE: usize = 1 << 13;
 /// The greatest number of dimensions.
 const MAX_RANK: usize = 64;
 
-/// What may be put in an array over `data`: the code or byte of `value` where it is not any value.
+/// Fails unless `value` may be an element of an array over `data`.
 pub(crate) fn check_element(vm: &mut Vm, data: Value, value: Value) -> Result<(), Exit> {
     match vm.heap.kind(data) {
         Some(Kind::String) if !value.is_character() => vm.exchange.type_error(value, "CHARACTER"),

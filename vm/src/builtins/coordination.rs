@@ -1,9 +1,9 @@
-//! What the library's fluents and resources do most often: notes of what a form has read, the setting of a
-//! fluent, a request that is granted at once.
+//! The most frequent operations of the library's fluents and resources: noting the sources that a form has
+//! read, setting a fluent, granting a request at once.
 //!
-//! Each could be written in ESL, and is here because it is the whole cost of a wake-up, or of a resource that
-//! nobody else wants. The records are those of `sources.esl` and `resources.esl`, whose fields come in the
-//! order of the constants. A builtin that is given something else does nothing, or gives up.
+//! Each could be written in ESL, and is here because it is the whole cost of a wake-up, or of an uncontended
+//! resource. The records are those of `sources.esl` and `resources.esl`, whose fields come in the order of
+//! the constants. A builtin that is given something else does nothing, or gives up.
 
 use smallvec::SmallVec;
 
@@ -270,8 +270,8 @@ pub(super) fn request_at_once(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(request)
 }
 
-/// Takes from a request what it holds, if that is an amount of one resource that nobody waits for; `None` if
-/// it is not.
+/// Takes from a request what it holds, if that is an amount of one resource that no request waits for; `None`
+/// if it is not.
 fn give_back(heap: &mut Heap, request: Value, granted: Value) -> Option<()> {
     let &[_, claims, _, _, _, state] = heap.slots(request, Kind::SimpleVector)?;
     if state.is_nil() {

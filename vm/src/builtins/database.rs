@@ -22,7 +22,7 @@ fn prepare(vm: &mut Vm) -> Result<(), Exit> {
     Ok(())
 }
 
-/// What goes on with a fault.
+/// Turns a fault of a formula into a failure of the program.
 fn checked<T>(vm: &mut Vm, outcome: Result<T, FormulaError>) -> Result<T, Exit> {
     match outcome {
         Ok(value) => Ok(value),
@@ -155,7 +155,7 @@ fn query(vm: &mut Vm, v: Value) -> Result<u64, Exit> {
     Ok(vm.exchange.count(v)? as u64)
 }
 
-/// What goes on where there may be no query of that number.
+/// Returns the query that was found, or fails because it is no longer open.
 fn open<T>(vm: &mut Vm, found: Option<T>) -> Result<T, Exit> {
     match found {
         Some(value) => Ok(value),

@@ -17,7 +17,7 @@
 //!
 //! In place of `text`, `(text . usage)` also says how the macro that failed is written.
 //!
-//! Diagnostics are a list of `(severity code text)`. Whoever begins a compilation ends it with
+//! Diagnostics are a list of `(severity code text)`. The caller that begins a compilation ends it with
 //! `%end-compilation`.
 //!
 //! Guarantees: a step does a bounded part of the work, for which the task is charged. What compilations hold
@@ -90,7 +90,7 @@ fn go_on_with_form(vm: &mut Vm, form: &mut FormWalk) -> Result<Option<ActiveComp
     vm.heap.check_room(0)?;
     let mut left = FORM_STEP;
     let datum = form.walk.run(&mut form.unit, &vm.heap, &vm.world, &mut left);
-    // What does not go through macros is not counted as such.
+    // The work of this walk is charged here, not as that of macro calls.
     _ = form.unit.take_work();
     vm.exchange.charge((FORM_STEP - left) * FORM_UNITS);
     let datum = match datum {

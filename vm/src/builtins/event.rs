@@ -27,7 +27,7 @@ pub(crate) fn nanoseconds(vm: &mut Vm, seconds: Value) -> Result<u64, Exit> {
     if let Some(n) = seconds.as_fixnum() {
         return Ok((n.max(0) as u64).saturating_mul(1_000_000_000).min(LATEST));
     }
-    // What is too large for a double is infinite; a conversion of floats saturates.
+    // A number too large for a double becomes infinite; a conversion of floats saturates.
     let seconds = match seconds.as_double() {
         Some(seconds) => seconds,
         None => vm.nearest_double(seconds, "REAL")?,
@@ -107,7 +107,8 @@ fn take_kept_by_one_of(vm: &mut Vm, events: Value) -> Result<Option<Value>, Exit
     take_kept_by(vm, events)
 }
 
-/// Takes the oldest signal that `event` keeps, if it is an input, and tells those who wait for room in it.
+/// Takes the oldest signal that `event` keeps, if it is an input, and wakes the tasks that wait for room in
+/// it.
 ///
 /// # Errors
 /// [`Exit::Collect`]; [`Exit::Again`] while signals are under delivery. Then nothing has happened.
@@ -435,7 +436,7 @@ pub(super) fn on_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.embedder.pin(&mut vm.heap, function);
     match vm.embedder.handlers.insert(signal.number(), function) {
         Some(before) => vm.embedder.unpin(before),
-        // Whoever sends the signal may still do so.
+        // The process may still receive the signal, which counts as a sender.
         None => vm.outside.senders += 1,
     }
     vm.outside.inbox.note_handled(signal);

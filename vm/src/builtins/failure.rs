@@ -1,4 +1,4 @@
-//! What the library needs to signal a failure: the handlers on the control stack, the end of a task,
+//! Builtins by which the library signals a failure: the handlers on the control stack, the end of a task,
 //! backtraces.
 
 use esl_bytecode::compile::SourcePlace;
@@ -82,7 +82,7 @@ pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [index, values] = exactly(arguments);
     let control = &vm.scheduler.task().control;
     let handler = match index.as_index() {
-        // Nothing handles it, and somebody outside gives the values.
+        // Nothing handles it, and a debugger supplies the values.
         None => 0,
         Some(index) => match control.entries.get(index) {
             Some(handler) => handler.base,
@@ -148,12 +148,12 @@ pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn is_reported(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    // What happens in its cleanups while it ends is told to nobody else.
+    // No form learns of failures in its cleanups while it ends, so they are reported.
     let is_ending = vm.scheduler.task().control.final_unwinding().is_some();
     Ok(Value::boolean(is_ending || !belongs_to_form(vm)))
 }
 
-/// Returns whether a form is told of the failure of the running task, and nobody else.
+/// Returns whether the failure of the running task goes to a form, and to nothing else.
 fn belongs_to_form(vm: &Vm) -> bool {
     let task = vm.scheduler.task();
     task.notify.is_true() && !task.flags.kept()

@@ -1,4 +1,4 @@
-//! Inputs: events that the outside may signal by name, and that keep what nobody has taken yet.
+//! Inputs: events that the outside may signal by name, and that queue signals until a task takes them.
 
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;

@@ -1,7 +1,7 @@
 //! JSON: values of a text that are neither long nor deep, parts of strings, and escapes.
 //!
-//! What is long or deep is taken apart by the module `:json`, which is in ESL and can be interrupted; its
-//! parts come here. Nothing here recurses deeper than [`DEPTH`].
+//! The module `:json`, which is in ESL and can be interrupted, takes long or deep values apart and passes the
+//! parts to this one. Nothing here recurses deeper than [`DEPTH`].
 
 use smallvec::SmallVec;
 
@@ -57,7 +57,7 @@ struct JsonReader<'a> {
     values: JsonValues,
 }
 
-/// What the program takes for the values of a text.
+/// The program's choice of values for those of a text.
 #[derive(Clone, Copy)]
 struct JsonValues {
     /// Whether objects become hash tables.

@@ -1,4 +1,4 @@
-//! What a program asks of the outside: its arguments, the time, and the embedder's functions.
+//! Requests of a program to the outside: its arguments, the time, and the embedder's functions.
 
 use crate::builtins::operation::host_call;
 use crate::datum;

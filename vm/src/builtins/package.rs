@@ -101,8 +101,8 @@ fn status_symbol(world: &World, status: Option<Status>) -> Value {
     }
 }
 
-/// What is written before the name of a symbol: nothing, `:`, `#:`, or a package with one or two colons.
-/// `None` for anything but a symbol.
+/// Returns the qualifier before the name of a symbol: nothing, `:`, `#:`, or a package with one or two
+/// colons. `None` for anything but a symbol.
 pub(crate) fn qualifier(vm: &Vm, symbol: Value) -> Option<Qualifier> {
     match vm.world.name_of(&vm.heap, symbol) {
         Some(name) => Some(vm.world.packages().qualifier(&name, vm.current_package())),

@@ -64,9 +64,9 @@ fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<FirstRead>, 
             let (object, calls) = read_object(vm, &datum)?;
             read([Value::T, object, calls], end)
         }
-        // What is faulty where the text is cut may be part of something else.
+        // A fault at the place where the text is cut may be the beginning of a correct datum.
         ReadOutcome::Fault(fault) if then != Then::Rest && !fault.is_unfinished() => {
-            // What comes after the fault is read the next time.
+            // The next call reads on after the fault.
             let end = text.ceil_char_boundary((fault.diagnostic.primary.span.end as usize).max(1));
             FirstRead { values: Err(fault), characters: count(end) }
         }
@@ -76,7 +76,7 @@ fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<FirstRead>, 
     }))
 }
 
-/// What comes first in a text.
+/// The first datum or fault of a text.
 struct FirstRead {
     /// Whether there is a datum, the object, and the calls in it; or what is no datum.
     values: Result<[Value; 3], ReadFault>,
@@ -141,7 +141,7 @@ pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// What was read is taken from the stream.
+/// Reads a datum, and takes its characters from the stream.
 pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = optional(arguments, 0);
     let mut part = FIRST_PART;

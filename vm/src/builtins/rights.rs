@@ -1,6 +1,6 @@
 //! Rights: asking for them, and narrowing them.
 //!
-//! What forms have narrowed is a binding of a symbol that no program can name ([`World::rights`]), so that
+//! Narrowed rights are a binding of a symbol that no program can name ([`World::rights`]), so that
 //! nothing can set it back, and tasks inherit it as they do all bindings. Its value is a list of strings, the
 //! innermost form's first, each of which writes [`Rights`] as a text that is made here and reaches no
 //! program. Rights that flags of a command have set say so, since another flag would widen them.
@@ -163,7 +163,7 @@ pub(super) fn lend_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !is_narrowed {
         return Ok(known);
     }
-    // What a program may have put into the place of the function has not got them.
+    // A function that the program may have put in its place does not get the rights.
     let function = if entry.kind == EntryKind::Recovery { vm.recovery_function(index)? } else { None };
     if vm.scheduler.task().control.bindings.is_full() {
         vm.reserve_bindings()?;

@@ -1,7 +1,7 @@
 //! Suspension of trees of tasks: finding their members, and those that stand still where they wait.
 //!
-//! What takes time here is to fetch the records and the objects of tasks from memory. So there is a pass of
-//! its own for each of these, in which the processor asks for the next one while it still waits for others.
+//! The time goes into fetching the records and the objects of tasks from memory. So each of these has a pass
+//! of its own, in which the processor requests the next one while it still waits for others.
 
 use smallvec::{SmallVec, smallvec};
 

@@ -274,7 +274,7 @@ pub(super) fn function_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(code) = vm.heap.function_code(arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "FUNCTION");
     };
-    // What comes before the first call may have no place.
+    // Instructions before the first call may have no place.
     let place = (0..WORDS_TO_PLACE).find_map(|pc| vm.world.source_place(&vm.heap, code, pc));
     let Some(place) = place else { return Ok(Value::NIL) };
     let source = vm.heap.alloc_str(&place.source)?;

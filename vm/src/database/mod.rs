@@ -238,7 +238,7 @@ impl Database {
 
     /// Calls `visit` with words and objects that determine the facts and rules, and their order.
     pub(crate) fn visit_state(&self, visit: &mut dyn FnMut(Result<u64, Value>)) {
-        // Without `..`: a new field does not compile before somebody has thought of it here.
+        // Without `..`: a new field does not compile until it is handled here.
         let Database {
             terms,
             relations,

@@ -1,4 +1,4 @@
-//! What there is to see of the database from outside: relations, and facts as texts.
+//! Surveys of the database: relations, and facts as texts.
 
 use super::{Database, Term};
 use crate::describe::describe;

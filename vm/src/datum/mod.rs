@@ -85,11 +85,11 @@ pub(crate) struct Unit {
     environments: Environments,
     /// Nodes visited since the last call of [`Unit::take_work`].
     work: u64,
-    /// Whether the data are for the embedder, who knows its own.
+    /// Whether the data are for the embedder, which gets its own objects back.
     is_for_embedder: bool,
 }
 
-/// What is left of a unit that is given up. It is freed in parts.
+/// The remains of a unit that is given up, which are freed in parts.
 pub(crate) struct UnitRemains {
     data: indexmap::map::IntoValues<u64, (Value, Datum)>,
     values: indexmap::map::IntoValues<u64, (Datum, Value)>,

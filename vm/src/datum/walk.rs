@@ -61,7 +61,7 @@ impl DatumWalk {
         }
     }
 
-    /// Has the walk represent large quoted objects as wholes: nobody looks into them.
+    /// Has the walk represent large quoted objects as wholes: their contents are not inspected.
     #[must_use]
     pub(crate) fn keeping_literals(self) -> DatumWalk {
         DatumWalk { keeps_literals: true, ..self }
@@ -120,7 +120,7 @@ impl DatumWalk {
         left: &mut usize,
     ) -> Result<Option<Datum>, WalkError> {
         let span = self.span;
-        // What has been made already is counted when a part of the walk is over.
+        // Data made already are counted when a part of the walk is over.
         let room = heap.room() / NODE_BYTES;
         let before = self.made.len() + self.met.len();
         while !self.steps.is_empty() {

@@ -226,7 +226,7 @@ impl VisitRunning for Walk<'_> {
 }
 
 impl VisitWorld for Walk<'_> {
-    /// What symbols of packages have that is not the language's from the beginning.
+    /// Values, functions and properties that the program has given to symbols of packages.
     fn symbols(&mut self, _: &World) {
         let vm = self.vm;
         for &NamedSymbol { digest, object: v, function, .. } in &*self.named() {

@@ -1,8 +1,8 @@
-//! Who runs the parts of a search: this thread, or several, each with a machine of its own.
+//! Worker threads of a search: this thread alone, or several, each with a machine of its own.
 //!
-//! The search hands out a batch of places at a time. Nobody changes the tree and the states while a batch is
-//! under way, and what its runs have found is taken in afterwards, in the order of the batch: so a search
-//! finds the same, in the same order, however many take part.
+//! The search hands out a batch of places at a time. Tree and states do not change while a batch is under
+//! way. The results of its runs are merged afterwards, in the order of the batch: so a search finds the same,
+//! in the same order, whatever the number of workers.
 
 use core::time::Duration;
 use std::collections::HashMap;
@@ -48,7 +48,7 @@ impl Claims {
     }
 }
 
-/// Those who run the parts of a search.
+/// The workers of a search.
 pub(super) trait Crew<T, E> {
     /// Runs on from each of these places, and returns what the runs have come by, in the same order. Where
     /// one comes to what another one has claimed, it ends. Stops all when `goes_on` is false, which is told
@@ -63,7 +63,7 @@ pub(super) trait Crew<T, E> {
     ) -> Result<Vec<RunTrace<T>>, E>;
 }
 
-/// Returns what the search knows, which nobody changes now.
+/// Borrows the search for reading; no thread writes to it while a batch is under way.
 fn read(search: &RwLock<Search>) -> RwLockReadGuard<'_, Search> {
     search.read().unwrap_or_else(PoisonError::into_inner)
 }
@@ -105,7 +105,7 @@ impl<S: Subject> Crew<S::Ending, S::Error> for LoneCrew<'_, S> {
 /// A batch that threads work on.
 struct SharedBatch {
     places: Vec<RunPlace>,
-    /// Which of them somebody has taken.
+    /// Whether each of them is taken by a worker.
     taken: Vec<AtomicBool>,
     claims: Claims,
     /// Number of new states that its runs have come to.
@@ -122,7 +122,7 @@ impl SharedBatch {
         order
     }
 
-    /// Takes a place for oneself. Returns whether nobody had.
+    /// Takes a place for the calling worker. Returns whether it was free.
     fn take(&self, number: usize) -> bool {
         !self.taken[number].swap(true, Ordering::Relaxed)
     }
@@ -135,8 +135,8 @@ struct BatchPart<T, E> {
     failed: Option<E>,
 }
 
-/// A part that is told when nothing is left to be taken of the batch, also if the thread panics. It is told
-/// as a whole: who takes it in sleeps meanwhile, and leaves the processors to the threads.
+/// A part that is sent when nothing is left to be taken of the batch, also if the thread panics. It is sent
+/// as a whole: the receiver sleeps meanwhile, and leaves the processors to the workers.
 struct TellsAtEnd<'a, T, E> {
     part: BatchPart<T, E>,
     tell: &'a Sender<BatchPart<T, E>>,
@@ -145,7 +145,7 @@ struct TellsAtEnd<'a, T, E> {
 impl<T, E> Drop for TellsAtEnd<'_, T, E> {
     fn drop(&mut self) {
         let traces = std::mem::take(&mut self.part.traces);
-        // Nobody listens any more once the search is over.
+        // The receiver is gone once the search is over.
         _ = self.tell.send(BatchPart { traces, failed: self.part.failed.take() });
     }
 }

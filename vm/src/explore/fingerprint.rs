@@ -57,8 +57,8 @@ pub(super) struct NamedSymbol {
 /// Makes fingerprints, and remembers of functions what does not change.
 #[derive(Default)]
 pub(super) struct Fingerprints {
-    /// What tells the code of a function from others, and a symbol of a package, by its address in the
-    /// present machine.
+    /// Digests of the codes of functions and of the symbols of packages, by their addresses in the present
+    /// machine.
     codes: CopyOnWrite<GivenMap<u64, Digest>>,
     /// The symbols of packages that are objects, by name.
     named: Rc<Vec<NamedSymbol>>,
@@ -66,7 +66,7 @@ pub(super) struct Fingerprints {
     named_of: usize,
     /// The collector's cycle in which the addresses are good.
     cycle: u64,
-    /// Which registers are live, by what tells the code.
+    /// The live registers, by the digest of the code.
     live: CopyOnWrite<GivenMap<Digest, Rc<Live>>>,
     numbers: ObjectNumbers,
     /// Room for the objects that a walk meets.
@@ -96,7 +96,7 @@ impl NamedSymbol {
     }
 }
 
-/// What is remembered of a machine as it stood.
+/// The memory of [`Fingerprints`] about a machine in an earlier state.
 pub(super) struct MachineMemory {
     codes: CopyOnWrite<GivenMap<u64, Digest>>,
     named: Rc<Vec<NamedSymbol>>,
@@ -266,7 +266,8 @@ impl Walk<'_> {
         if !v.is_address() {
             return self.word(v.bits());
         }
-        // What has the tag of a cons or an object is no other word.
+        // Words with the tag of a cons or an object are addresses, so numbers with these tags are
+        // unambiguous.
         let number = self.number(v);
         self.word(u64::from(number) << TAG_MASK.count_ones() | v.bits() & TAG_MASK);
     }
@@ -324,13 +325,13 @@ impl Walk<'_> {
             let live = self.live(frame.function);
             let mut registers = live.at(frame.word);
             if frame.is_exact && !is_innermost {
-                // What took the place of this instruction may be followed by it or by the next one.
+                // The call in place of this instruction may be followed by it or by the next one.
                 registers = registers.with(live.at(frame.word + 1)).with(live.at(frame.word + 2));
             }
             is_innermost = false;
             for (register, &v) in frame.registers().iter().enumerate() {
-                // What is kept alive matters to the collector, even if nothing will read it. Other words that
-                // nothing will read do not, and may be the return addresses of calls that are over.
+                // A value that is kept alive matters to the collector, even if nothing will read it. Other
+                // dead words do not matter, and may be the return addresses of calls that are over.
                 if registers.contains(register) || self.is_strict && v.is_address() {
                     self.word(register as u64);
                     if self.is_return_address(v) {
@@ -440,13 +441,13 @@ impl Walk<'_> {
         }
     }
 
-    /// What is known by what tells it from others.
+    /// An object that its digest identifies.
     pub(super) fn digest_of(&mut self, digest: Digest) {
         self.word(digest.0);
         self.word(digest.1);
     }
 
-    /// What tells a symbol of a package from others; `None` for another symbol.
+    /// Returns the digest of a symbol of a package; `None` for another symbol.
     fn symbol(&mut self, v: Value) -> Option<Digest> {
         if let Some(&digest) = self.known.codes.get(&v.bits()) {
             return Some(digest);
@@ -489,7 +490,7 @@ impl Walk<'_> {
     fn function(&mut self, function: Value) {
         let code = self.code_of_function(function);
         self.digest.add_all([code.0, code.1].into_iter());
-        // What a function of the library without captures has in that place is its number.
+        // A lazy function of the library has its number in the place of captures.
         let heap = &self.vm.heap;
         let count = match sort_of(heap, function) {
             Some(Sort::Lazy) | None => 0,
@@ -503,7 +504,7 @@ impl Walk<'_> {
         self.values(&captures[..captures.len().min(count)]);
     }
 
-    /// What tells the code of a function from all others: of one of the library its number.
+    /// Returns the digest of the code of a function: for one of the library its number.
     fn code_of_function(&mut self, function: Value) -> Digest {
         match image_origin(self.heap(), function) {
             Some((image, number)) => Digest(image as u64, u64::from(number)),
@@ -511,7 +512,7 @@ impl Walk<'_> {
         }
     }
 
-    /// What tells a code from all others: its words, where they were written, and its constants.
+    /// Returns the digest of a code: of its words, their places in the source, and its constants.
     fn code(&mut self, code: Value) -> Digest {
         if let Some(&digest) = self.known.codes.get(&code.bits()) {
             return digest;

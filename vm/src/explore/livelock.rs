@@ -14,10 +14,10 @@ use std::collections::VecDeque;
 
 /// Rank that stands for time.
 pub(super) const TIME: u8 = 63;
-/// Rank of nobody.
+/// Rank that stands for no task.
 pub(super) const NOBODY: u8 = u8::MAX;
 
-/// What is to be known of the tasks in a state.
+/// The tasks in a state, as far as the search for livelocks needs them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct StateTasks {
     /// Those that can go on, by rank, and whether a timer runs.
@@ -28,7 +28,7 @@ pub(super) struct StateTasks {
     pub(super) last: u8,
 }
 
-/// What led from a state to the next.
+/// The cause of a step from a state to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StepCause {
     /// Rank of the task that went on, [`TIME`], or [`NOBODY`] if that is not known.
@@ -297,7 +297,7 @@ mod tests {
         let timer = 1 << TIME;
         let tasks = [state(timer | 0b11), state(timer | 0b01), state(0b11)];
         assert_eq!(lap(&tasks, &one), None);
-        // After a step to other tasks, nobody knows who is who.
+        // After a step to other tasks, ranks do not name the same tasks.
         let mut others = both;
         others[0].cause.keeps_tasks = false;
         assert_eq!(lap(&[state(0b11); 3], &others), None);

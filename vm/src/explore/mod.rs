@@ -172,7 +172,7 @@ pub struct Exploration<T> {
     pub livelock: Option<Livelock>,
     /// Whether a schedule returns to a state: then it can go on for ever, if only by treating tasks unfairly.
     pub has_cycle: bool,
-    /// What kept the search from trying everything, if anything did.
+    /// The limit that kept the search from trying everything, if one did.
     pub limit: Option<SearchLimit>,
 }
 
@@ -186,7 +186,7 @@ pub struct Livelock {
     pub lap: usize,
 }
 
-/// What keeps a search from trying everything.
+/// A limit that keeps a search from trying everything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchLimit {
     /// [`Settings::states`].
@@ -197,7 +197,7 @@ pub enum SearchLimit {
     Switches,
     /// [`Settings::faults`].
     Faults,
-    /// The caller, who has had enough.
+    /// A request of the caller to stop.
     Asked,
 }
 
@@ -356,7 +356,7 @@ fn search_by<T: PartialEq + Clone, E>(
                 let steps = (places[run].serial, &*traces[run].steps, first);
                 let merged = merging.take_in(search, &mut place, steps);
                 match traces[run].end {
-                    // What the other run goes on with, this one would have, too.
+                    // This run would have gone on exactly like the other one.
                     TraceEnd::Joined(step) if merged == Merged::New => (run, first) = (step.0, step.1 + 1),
                     _ => break merged,
                 }

@@ -32,7 +32,7 @@ pub(super) struct Search {
     pub(super) states: HashMap<u128, u32>,
     /// Node from which each state was reached first.
     pub(super) places: Vec<u32>,
-    /// What is to be known of the tasks in each state.
+    /// The tasks in each state.
     pub(super) tasks: Vec<StateTasks>,
     /// Steps between states.
     pub(super) steps: Vec<StateStep>,
@@ -91,7 +91,7 @@ impl Search {
         }
     }
 
-    /// Forgets what was noted for those who run the batches, who have taken note of it.
+    /// Forgets the notes for the workers, which have read them.
     pub(super) fn settled(&mut self) {
         self.placed.clear();
         self.closed.clear();

@@ -1,4 +1,4 @@
-//! What there is to choose from at a point, and what happens in a schedule, as it is told.
+//! The alternatives at a point, and the events of a schedule, as reports show them.
 
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
@@ -9,7 +9,7 @@ use crate::task::TaskIndex;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// What there is to choose from at a point.
+/// The alternatives at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Runnable<'a> {
     /// The tasks that can run; with ways, the one that asks comes first.
@@ -62,12 +62,12 @@ pub enum Switch {
     },
 }
 
-/// What happens in a schedule, as it is told.
+/// An event of a schedule, as reports show it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScheduleStep {
     /// Time of the machine's clock, in nanoseconds.
     pub time: u64,
-    /// What happens.
+    /// The event.
     pub event: ScheduleEvent,
 }
 

@@ -29,7 +29,7 @@ pub(super) struct TraceStep {
     pub(super) has_ways: bool,
     /// The tasks there.
     pub(super) tasks: StateTasks,
-    /// What led to it.
+    /// The cause of the step to it.
     pub(super) cause: StepCause,
 }
 
@@ -94,14 +94,14 @@ pub(super) enum TraceEnd<T> {
     Stopped,
 }
 
-/// What a run has come by.
+/// The course of a run.
 #[derive(Debug)]
 pub(super) struct RunTrace<T> {
     pub(super) steps: Vec<TraceStep>,
     pub(super) end: TraceEnd<T>,
 }
 
-/// A machine of a search with its places, and who began it.
+/// A machine of a search with its places, and the subject that began it.
 pub(super) struct Tracer<'a, S> {
     settings: &'a Settings,
     keeper: Keeper<'a>,
@@ -191,10 +191,10 @@ impl<'a, S: Subject> Tracer<'a, S> {
     }
 }
 
-/// What a search makes of the runs of a batch.
+/// Merges the runs of a batch into the search.
 pub(super) struct Merging<'a> {
     pub(super) settings: &'a Settings,
-    /// What has kept the search from trying everything.
+    /// The limit that has kept the search from trying everything.
     pub(super) limit: &'a mut Option<SearchLimit>,
     /// Preemptions of the schedules that are tried.
     pub(super) switches: usize,
@@ -207,7 +207,7 @@ pub(super) struct MergePlace {
     pub(super) before: Option<u32>,
 }
 
-/// What is to be done after the steps of a run were taken in.
+/// The outcome of merging the steps of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Merged {
     /// They lead to a state that is known.

@@ -1,4 +1,4 @@
-//! A journal of a run, for those who look at it: its failures, and how late timers were.
+//! A journal of a run, for surveys: its failures, and the delays of timers.
 //!
 //! It is kept from the beginning of a run on request. Only the latest failures are kept whole, and only the
 //! first causes are counted apart, so a run of any length takes no more room.
@@ -56,7 +56,7 @@ impl Journal {
         let Some(mut row) = last.and_then(|index| self.recent.remove(index)) else { return };
         row.report = Some(report);
         row.frames = frames;
-        // It is news to those who have seen it without the report, though it is no other failure.
+        // Viewers that have seen the failure without its report get it again, under a new number.
         self.noted += 1;
         self.recent.push_back(FailureRow { number: self.noted, ..row });
     }

@@ -1,11 +1,11 @@
-//! What tasks use in their turns, in ticks and in time, for profiles.
+//! The consumption of tasks in their turns, in ticks and in time, for profiles.
 //!
-//! Guarantee: what is noted is exact for each task. The clock is read where a turn, or a part of one, begins
+//! Guarantee: the figures are exact for each task. The clock is read where a turn, or a part of one, begins
 //! and ends: so waiting costs nothing, and no read falls into the work between.
 
 use crate::task::{TaskIndex, TaskNumber};
 
-/// What was used.
+/// An amount of work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UsedResources {
     /// Ticks.
@@ -22,14 +22,14 @@ impl UsedResources {
     }
 }
 
-/// What a task has used since it was last asked for.
+/// The consumption of a task since the last query.
 #[derive(Clone, Copy)]
 struct MeteredTask {
     number: TaskNumber,
     used: UsedResources,
 }
 
-/// What tasks have used since it was last asked for.
+/// The consumption of all tasks since the last query.
 #[derive(Default)]
 pub(crate) struct Meter {
     /// Whether it is wanted.
@@ -107,7 +107,7 @@ mod tests {
         assert_eq!(meter.take(second.0, first.1), used(0, 0), "another task had that place");
         assert_eq!(meter.take(first.0, first.1), used(12, 1200));
         assert_eq!(meter.take(first.0, first.1), used(0, 0), "it was taken");
-        // Another task has the place of the second, whose end nobody has noted.
+        // Another task has the place of the second, whose end was not noted.
         meter.begin_turn(used(1000, 0));
         meter.end_turn(used(1002, 1), (second.0, TaskNumber(9)));
         assert_eq!(meter.take_ended(), [("task 8".to_string(), used(1, 100))]);

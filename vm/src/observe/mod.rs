@@ -1,7 +1,6 @@
-//! Watching a run: who is told of it, and the figures that are gathered of it.
+//! Watching a run: its observers, and the figures gathered about it.
 //!
-//! Whether a run is watched changes nothing in the run. Not here: the words in which tasks and events are
-//! spoken of (`report`).
+//! Observation changes nothing in the run. Not here: the texts about tasks and events (`report`).
 
 mod figures;
 mod journal;
@@ -44,12 +43,12 @@ pub struct OpenCalls {
     pub place: Option<SourcePlace>,
 }
 
-/// Everything that is kept for those who watch a run.
+/// All data about a run that exist for its observation.
 #[derive(Default)]
 pub(crate) struct Watch {
-    /// Whether anybody has to be told what happens.
+    /// Whether failures and collections are to be noted or sent to observers.
     pub(crate) is_watched: bool,
-    /// Whether that is so of each turn, signal and fact, and not only of failures and the collector.
+    /// Whether each turn, signal and fact is to be noted, too.
     pub(crate) is_followed: bool,
     /// Whether reports of failures are kept with the variables of their frames.
     pub(crate) tells_variables: bool,
@@ -61,13 +60,13 @@ pub(crate) struct Watch {
     pub(crate) coming: Coming,
     /// The figures.
     pub(crate) figures: Figures,
-    /// What tasks use in their turns.
+    /// The consumption of tasks in their turns.
     pub(crate) meter: Meter,
-    /// What has happened, for those who look at the run.
+    /// The latest failures and delays, for surveys.
     pub(crate) journal: Journal,
-    /// Whether what happens to tasks is written to the stream for reports.
+    /// Whether the trace of tasks is written to the stream for reports.
     pub(crate) traces_tasks: bool,
-    /// How often control has passed each place that is counted; `None` if nobody wants to know.
+    /// How often control has passed each counted place; `None` unless passages are counted.
     pub(crate) passages: Option<Vec<u64>>,
 }
 

@@ -31,7 +31,8 @@ pub enum Seen<'a> {
     IsReady,
     /// It waits, for what this says.
     Waits(&'a str),
-    /// It stands still, as it was suspended: it waits to be resumed, and this says who has suspended it.
+    /// It stands still, as it was suspended: it waits to be resumed, and this names the task that suspended
+    /// it.
     IsSuspended(&'a str),
     /// The task's end is asked for.
     IsToEnd,

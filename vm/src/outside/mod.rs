@@ -64,9 +64,9 @@ pub(crate) struct Outside {
     pub(crate) operations: Operations,
     /// The inputs that the outside may signal, by name.
     pub(crate) inputs: BTreeMap<String, Value>,
-    /// Number of those outside who may signal them.
+    /// Number of senders outside that may signal them.
     pub(crate) senders: u64,
-    /// Whether operators may come who signal them.
+    /// Whether operators may attach that can signal them.
     pub(crate) attendance: ExpectedOperators,
     /// Stream that reports are written to.
     pub(crate) complaints: Output,
@@ -74,7 +74,7 @@ pub(crate) struct Outside {
     pub(crate) exit_status: Option<u8>,
 }
 
-/// Operators of a run, who are not there yet.
+/// Operators of a run that are not attached yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ExpectedOperators {
     /// None can come.

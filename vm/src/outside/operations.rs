@@ -12,11 +12,11 @@ use crate::value::Value;
 pub(crate) struct OpenOperation {
     /// Its handle, which is an event.
     pub(crate) handle: Value,
-    /// What cancels it.
+    /// Cancels it.
     pub(crate) canceller: Canceller,
     /// Whether the program has cancelled it.
     pub(crate) is_cancelled: bool,
-    /// Whether nobody waits until it has stopped.
+    /// Whether a call that is left does not wait until it has stopped.
     pub(crate) is_detached: bool,
     /// The task that has begun it.
     pub(crate) begun_by: TaskNumber,

@@ -1,4 +1,4 @@
-//! What is said of tasks: to observers, in traces, in reports, and in figures.
+//! Texts about tasks: for observers, traces, reports and figures.
 
 mod calls;
 mod figures;

@@ -168,7 +168,7 @@ pub(crate) fn tasks_left(vm: &Vm) -> Vec<String> {
     tasks.iter().take(SHOWN).map(|task| say(task)).collect()
 }
 
-/// Returns what the operations are called that are under way and that somebody waits for.
+/// Returns the names of the operations under way that are not detached.
 pub(crate) fn operations_left(vm: &Vm) -> Vec<String> {
     let awaited = vm.outside.operations.open.values().filter(|open| !open.is_detached);
     awaited.take(SHOWN).map(|open| event_label(vm, open.handle)).collect()

@@ -1,5 +1,5 @@
-//! What happens to tasks, for those who watch; and the trace of tasks: a line for each beginning, wait, going
-//! on, request of an abort, and end.
+//! Events of tasks, for observers; and the trace of tasks: a line for each beginning, wait, resumption,
+//! request of an abort, and end.
 
 use super::{label_of, reason_of, show, task_label};
 use crate::describe::describe;
@@ -29,7 +29,7 @@ impl Vm {
     }
 }
 
-/// Notes what happens to the task with this index, for whoever watches.
+/// Notes an event of the task with this index, for trace and observers.
 #[inline]
 pub(crate) fn note(vm: &mut Vm, index: TaskIndex, happening: Happening) {
     if vm.watch.is_followed {

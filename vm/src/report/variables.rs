@@ -1,4 +1,4 @@
-//! The variables of frames, with their values, for those who look at a run.
+//! The variables of frames, with their values, for surveys and reports.
 //!
 //! Only what is in scope at the place of a frame is shown, as far as the compiler has left it there. Texts of
 //! values are short, and there are not too many of them, whatever the program has.
@@ -50,13 +50,13 @@ pub(crate) fn with_variables<'a>(vm: &Vm, report: &str, frames: impl Iterator<It
     let frames: Vec<Frame<'a>> = frames.take(FRAMES).collect();
     let lines: Vec<&str> = report.lines().collect();
     let mut rows: Vec<Vec<FrameVariable>> = vec![Vec::new(); lines.len()];
-    // What a cleanup was run for is told behind it, and so are failures of other tasks; that of a task as
-    // which this one fails before it. Those frames are gone.
+    // The report names the reason for a cleanup after it, and so failures of other tasks; the failure of a
+    // task as which this one fails stands before. Those frames are gone.
     let is_past = |line: &&str| line.starts_with("  while cleaning up after ") || line.starts_with("In ");
     let end = lines.iter().skip(1).position(is_past).map_or(lines.len(), |at| at + 1);
     let begin = lines[..end].iter().rposition(|line| line.starts_with("  in task ")).map_or(0, |at| at + 1);
     if lines[begin..end].iter().all(|line| *line != CUT_OFF) && frames.len() < FRAMES {
-        // What is gone is further in than what is there, so both are compared from outside.
+        // The missing frames are the innermost ones, so report and stack are compared from outside.
         let mut outer = frames.len();
         for (index, line) in lines[..end].iter().enumerate().skip(begin).rev() {
             if let Some(found) = frames[..outer].iter().rposition(|frame| is_line_of(vm, line, frame)) {

@@ -30,8 +30,9 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
     stops
 }
 
-/// Returns whether something waits for a call that goes first: what a task of the program could tell from
-/// the order, and the values that such calls need. Whatever ends, pauses or lists tasks does not.
+/// Returns whether an arrival is deferred until a call that goes first has ended: those whose order a task of
+/// the program could observe, and releases of values that such calls need. Requests to end, pause or list
+/// tasks are not deferred.
 fn is_deferrable(incoming: &Incoming) -> bool {
     matches!(
         incoming,
@@ -75,7 +76,7 @@ fn take_in_one(vm: &mut Vm, incoming: Incoming) -> bool {
         Incoming::SenderCame => vm.outside.senders += 1,
         Incoming::SenderLeft => {
             vm.outside.senders = vm.outside.senders.saturating_sub(1);
-            // Nobody is left who could end a pause.
+            // Without a sender nothing could end a pause.
             vm.scheduler.is_paused &= vm.outside.senders > 0;
         }
         Incoming::Attended => vm.outside.attendance = ExpectedOperators::MayCome,
@@ -83,7 +84,7 @@ fn take_in_one(vm: &mut Vm, incoming: Incoming) -> bool {
     false
 }
 
-/// Waits in the host, and answers those who look at the run meanwhile.
+/// Waits in the host, and answers surveys meanwhile.
 pub(crate) fn wait_in_host(vm: &mut Vm, deadline: Option<u64>, awaited: Awaited) -> Wake {
     loop {
         let wake = vm.outside.host.wait(deadline, awaited);
@@ -95,7 +96,7 @@ pub(crate) fn wait_in_host(vm: &mut Vm, deadline: Option<u64>, awaited: Awaited)
     }
 }
 
-/// Answers those who look at the run, which changes nothing in it.
+/// Answers surveys of the run, which change nothing in it.
 pub(super) fn serve_looks(vm: &mut Vm) {
     for look in vm.outside.inbox.take_looks() {
         match look {
@@ -105,7 +106,7 @@ pub(super) fn serve_looks(vm: &mut Vm) {
     }
 }
 
-/// Has the observers watch the run who have come.
+/// Registers newly arrived observers.
 fn admit_observers(vm: &mut Vm) {
     for observer in vm.watch.coming.take() {
         vm.add_observer(observer);

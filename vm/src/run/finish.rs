@@ -1,4 +1,5 @@
-//! The end of a task: noting how it came, telling whoever waits for it, and ending the run with the last.
+//! The end of a task: noting its outcome, waking the tasks that wait for it, and ending the run with the
+//! last.
 
 use super::abort::abort_others;
 use super::pending::interrupt_by;
@@ -14,7 +15,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, lineage};
 
-/// Notes how the running task has ended, and tells whoever wants to know.
+/// Notes how the running task has ended, wakes the tasks that wait for it, and answers a call from outside.
 pub(super) fn finish_task(vm: &mut Vm) {
     let end = match vm.scheduler.turn.ending.take().unwrap_or(TaskEnd::Succeeded) {
         TaskEnd::Spent => TaskEnd::Failed(vm.world.known.budget_exhausted),
@@ -22,7 +23,7 @@ pub(super) fn finish_task(vm: &mut Vm) {
     };
     let mut values = std::mem::take(&mut vm.exchange.values);
     let object = vm.scheduler.task().object;
-    // What others are told of has to be made before; here there is nothing to go back to.
+    // These objects are made before others learn of the end: an allocation here cannot be retried.
     let result = match (end, &values[..]) {
         (TaskEnd::Succeeded, &[value]) => value,
         (TaskEnd::Succeeded, values) => allocate_without_retry(vm, |vm| Ok(vm.heap.list(values)?)),
@@ -60,13 +61,13 @@ pub(super) fn finish_task(vm: &mut Vm) {
         extra.end = Some(end);
         extra.values.clone_from(&values);
         if answer_call(vm, end, &values) {
-            // Nobody asks for it any more.
+            // The answer is given, so the record need not be kept.
             vm.scheduler.task_mut().flags.set_kept(false);
         }
     }
     values.clear();
     vm.exchange.values = values;
-    // The list of arguments is made only if somebody will see it.
+    // The list of arguments is made only if a task waits for it.
     allocate_without_retry(vm, |vm| {
         let end = vm.world.known.task_end;
         let arguments = if is_awaited { vm.heap.cons(end, Value::NIL)? } else { Value::NIL };

@@ -33,7 +33,7 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, amount: Opt
         let parent = scheduler.accounts.for_child(outer, is_free);
         limit.account = scheduler.accounts.open(parent, amount, AccountOwner::Form(index, number));
         scheduler.task_mut().account = limit.account;
-        // What the slice has used so far is not charged to it, and the next one is to be no longer than it
+        // The ticks of the slice so far are not charged to it, and the next slice is no longer than it
         // allows.
         vm.exchange.charges.end_slice();
     }

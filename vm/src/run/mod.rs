@@ -1,7 +1,7 @@
 //! Running tasks: everything that happens to them while the machine runs.
 //!
 //! ```text
-//! spawn     making a task             signal    waking those who wait for an event
+//! spawn     making a task             signal    waking the waiters of an event
 //! turn      its turns, slice by slice wake      making a task runnable
 //! pending   aborts, expired limits    limit     opening limits, and their expiry
 //!           and interrupts, delivered timers    time, and sleeping while nothing can run
@@ -57,7 +57,7 @@ use crate::vm::Vm;
 /// Why a run came back to the embedder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunOutcome {
-    /// What was to be run has ended: every task, or the one that was named.
+    /// The tasks to be run have ended: all of them, or the one that was named.
     Done,
     /// The tasks that are left all wait for what cannot come.
     Waiting,

@@ -12,8 +12,8 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 /// Returns whether something may come into the inbox that lets a waiting task go on: a signal of an input, or
-/// news of an operation whose handle somebody waits for. Of the others, such as one that an earlier program
-/// has left, no task would hear.
+/// news of an operation whose handle a task waits for. News of others, such as one that an earlier program
+/// has left, would wake no task.
 pub(super) fn expects_news(vm: &Vm) -> bool {
     vm.outside.senders > 0 || expects_operation(vm) || awaits_operator(vm)
 }
@@ -24,7 +24,7 @@ fn expects_operation(vm: &Vm) -> bool {
     vm.outside.operations.handles().any(|handle| any_is_awaited || is_awaited(handle))
 }
 
-/// Returns whether a task waits for an input, and operators may come who signal it.
+/// Returns whether a task waits for an input that an operator may still attach to signal.
 fn awaits_operator(vm: &Vm) -> bool {
     vm.outside.attendance != ExpectedOperators::Nobody
         && vm.outside.inputs.values().any(|&input| event::is_awaited(&vm.heap, input))

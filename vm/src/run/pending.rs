@@ -31,7 +31,7 @@ pub(crate) fn interrupt_by(vm: &mut Vm, guard: Value) {
 /// another function.
 ///
 /// # Errors
-/// What takes the task off the processor before it runs.
+/// The reason for which the task gives up the processor before it runs.
 pub(super) fn deliver_pending(vm: &mut Vm) -> Result<(), Leave> {
     let was_unwinding = vm.scheduler.task().control.is_unwinding();
     let guard = take_pending(vm);
@@ -50,8 +50,8 @@ pub(super) fn deliver_pending(vm: &mut Vm) -> Result<(), Leave> {
 }
 
 /// Turns what is pending for the running task into an unwinding, or returns a guard whose function is to be
-/// called where the task stands. What has to wait for the end of a cleanup, or of a critical section, stays
-/// noted.
+/// called where the task stands. Requests that have to wait for the end of a cleanup, or of a critical
+/// section, stay noted.
 fn take_pending(vm: &mut Vm) -> Option<Value> {
     let scheduler = &mut vm.scheduler;
     if scheduler.task().account != AccountId::NONE && scheduler.is_task_spent() {
@@ -71,7 +71,7 @@ fn take_pending(vm: &mut Vm) -> Option<Value> {
         return None;
     }
     if scheduler.task().flags.suspended() {
-        // What else is pending is delivered when it goes on.
+        // Other pending requests are delivered when it goes on.
         scheduler.task_mut().flags.set_attention(false);
         return None;
     }
@@ -79,7 +79,7 @@ fn take_pending(vm: &mut Vm) -> Option<Value> {
     // One that was opened in the cleanup ends its form there, whatever else is pending.
     if let Some((entry, cause)) = scheduler.task().expired_limit(cleanup) {
         unwind_to_limit(vm, entry, cause);
-        // What is noted besides is looked at again when that is over.
+        // Other pending requests are examined again when the unwinding is over.
         return None;
     }
     let expired = scheduler.task().expired_limit(None);

@@ -24,7 +24,7 @@ pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
             let tasks = tasks(vm);
             vm.outside.inbox.answer(number, Answer::Tasks(tasks));
         }
-        // What ends begins nothing new.
+        // A run that is ending begins no call.
         Question::Call { .. } if vm.embedder.is_ending || all_are_to_end(vm) => {
             vm.outside.inbox.answer(number, Answer::Ended);
         }
@@ -41,8 +41,8 @@ pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
     }
 }
 
-/// Returns whether all tasks of a program have been asked to end. Each that ends has those asked that were
-/// made since; after the last one nobody does.
+/// Returns whether all tasks of a program have been asked to end. Each task that ends passes the request to
+/// the tasks made since; no task does so after the last one.
 fn all_are_to_end(vm: &Vm) -> bool {
     vm.scheduler.main.is_some() && vm.scheduler.counts.made_at_end > 0
 }
@@ -102,7 +102,7 @@ fn import_datum(vm: &mut Vm, datum: &Datum) -> Option<Value> {
     vm.heap.as_cons(cell).map(|cell| cell.car)
 }
 
-/// Makes the task that calls a function for somebody outside; `None` if there is no room for it.
+/// Makes the task that calls a function for a request from outside; `None` if there is no room for it.
 fn begin_call(vm: &mut Vm, callee: &FunctionRef, arguments: &[Datum], goes_first: bool) -> Option<TaskId> {
     let function = vm.callee(callee)?;
     vm.embedder.pin(&mut vm.heap, function);
@@ -148,8 +148,8 @@ pub(super) fn abort_task(vm: &mut Vm, number: TaskNumber) {
     }
 }
 
-/// Answers whoever waits for the call of the running task, which has ended with these values. Returns whether
-/// it was for a call.
+/// Answers the call that the running task was made for, which has ended with these values. Returns whether it
+/// was made for a call.
 pub(super) fn answer_call(vm: &mut Vm, end: TaskEnd, values: &[Value]) -> bool {
     let Some(number) = vm.embedder.calls.remove(&vm.scheduler.turn.index) else { return false };
     let answer = match end {

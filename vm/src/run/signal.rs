@@ -1,11 +1,11 @@
-//! Signals, and handing them to those who wait.
+//! Signals, and handing them to waiters.
 //!
 //! A signal is one step for the program, but it may have a million waiters. Those beyond the first thousand
 //! become a [`Delivery`], which is worked off between turns, a thousand waiters at a time. Until that is done
 //! the task that signals is held back, and so is any task that would begin a wait, let one time out, or
-//! signal; the latter try again then ([`Exit::Again`]). So no task can tell the difference: whoever waits
-//! when the signal is given gets it, and goes on before the task that has given it; whoever begins later does
-//! not.
+//! signal; the latter try again then ([`Exit::Again`]). So no task can tell the difference: a task that waits
+//! when the signal is given gets it, and goes on before the task that has given it; a task that begins to
+//! wait later does not.
 
 use super::finish::allocate_without_retry;
 use super::limit::charge_account;
@@ -107,7 +107,7 @@ fn is_ready(vm: &Vm, wait: Value) -> bool {
     is_free && link::takes(&vm.heap, wait)
 }
 
-/// Hands a signal to those who wait for an event, and counts it.
+/// Hands a signal to the waiters of an event, and counts it.
 ///
 /// # Errors
 /// [`Exit::Collect`] without room; then nothing has happened.
@@ -262,7 +262,7 @@ fn release_held(vm: &mut Vm) {
 #[inline(always)]
 fn hand_over(vm: &mut Vm, wait: Value, signal: (Value, TaskNumber), arguments: Value, cells: &mut Value) {
     if input::is_input(&vm.heap, signal.0) && link::takes(&vm.heap, wait) {
-        // What an input keeps is taken by the wait itself, when its task looks.
+        // The wait itself takes a signal that an input keeps, when its task runs.
         if !input::is_empty(&vm.heap, signal.0) || !is_ready(vm, wait) {
             return;
         }

@@ -29,7 +29,7 @@ pub(crate) struct SpawnOptions {
     pub hidden: bool,
     /// Whether it works for all: it has no bindings of its maker, and charges no account.
     pub is_service: bool,
-    /// Who is told of its end: a wait, a guard, or `NIL`.
+    /// The object notified of its end: a wait, a guard, or `NIL`.
     pub notify: Value,
 }
 
@@ -141,11 +141,11 @@ pub(crate) fn make_task(
     let mut slots = [Value::NIL; event::TASK_LENGTH];
     slots[event::NAME] = options.name;
     slots[event::COUNT] = Value::small(0);
-    // A service belongs to nobody, so it is not suspended with its maker.
+    // A service belongs to no task, so it is not suspended with its maker.
     if let Some(maker) = maker.filter(|_| !options.is_service) {
         slots[event::RESULT] = lineage::node_of(heap, maker.object)?;
     }
-    // What takes the task into the queue of the wait at its end is made now.
+    // The cell that enters the task into the queue of the wait at its end is made now.
     let is_wait = heap.is(options.notify, Kind::Wait);
     let notify = if is_wait { heap.cons(options.notify, Value::NIL)? } else { options.notify };
     let object = heap.alloc_record(Kind::Task, 0, 0, &slots)?;
@@ -170,7 +170,7 @@ pub(crate) fn make_task(
     if let Some(maker) = scheduler.running.as_ref().filter(|_| !options.is_service) {
         flags.set_serves_cleanup(maker.runs_cleanup() || maker.flags.serves_cleanup());
         if maker.account != AccountId::NONE {
-            // What a cleanup makes in a form that has used up its account is not to end at once.
+            // A task that a cleanup makes in a form that has used up its account must not end at once.
             let is_free = maker.runs_cleanup();
             let account = scheduler.accounts.for_child(maker.account, is_free);
             scheduler.accounts.enter(account);
@@ -183,7 +183,7 @@ pub(crate) fn make_task(
             && control.bindings.len() > 0
         {
             exchange.charge(2 * control.bindings.len());
-            // What is in force around the maker cannot be reached from another task.
+            // Restarts and recoveries around the maker cannot be reached from another task.
             let without = [world.known.restarts, world.known.recoveries];
             task.control.bindings = control.bindings.copy(&without);
         }
@@ -210,7 +210,7 @@ pub(crate) fn make_task(
 /// of that one, if it belongs to a form there, or a part of that. `None` without bounds.
 ///
 /// # Errors
-/// `:budget-exhausted` if nothing is left: nobody would be there to end the new task.
+/// `:budget-exhausted` if nothing is left: nothing would end the new task.
 fn fund_of_child(vm: &mut Vm, belongs: bool) -> Result<Option<Fund>, Exit> {
     let Vm { scheduler, outside, cpu, exchange, .. } = vm;
     if scheduler

@@ -240,7 +240,7 @@ fn end_slice(vm: &mut Vm, slice: OpenSlice, leave: Leave) {
 /// is, and ends a critical section that has taken too long.
 ///
 /// # Errors
-/// What takes the task off the processor before it runs.
+/// The reason for which the task gives up the processor before it runs.
 fn begin_running(vm: &mut Vm, has_pending: bool) -> Result<(), Leave> {
     if has_pending {
         deliver_pending(vm)?;

@@ -1,7 +1,7 @@
 //! Accounts of ticks and of other measures: budgets and quotas of forms, budgets of tasks.
 //!
 //! A form with a budget opens an account under that of its task, and tasks made inside charge it too, so
-//! nobody gains ticks by making tasks. When it is spent, the form ends, and so do tasks made inside that
+//! making tasks gains no ticks. When it is spent, the form ends, and so do tasks made inside that
 //! outlive its owner; the account of a task's own budget has no form, and ends all tasks that charge it.
 //!
 //! Each account is of one measure, and what is charged passes by those of another one.
@@ -21,7 +21,7 @@ pub(crate) enum AccountOwner {
     Nobody,
 }
 
-/// What an account counts.
+/// The unit that an account counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Measure {
     /// Ticks used.
@@ -37,7 +37,7 @@ pub(crate) enum Measure {
 /// How much an account allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Amount {
-    /// What is counted.
+    /// The counted unit.
     pub measure: Measure,
     /// How many of it.
     pub units: u64,
@@ -55,7 +55,7 @@ impl Amount {
 /// Ticks, or units of another measure, that may be used together.
 #[derive(Clone, Debug)]
 pub(crate) struct Account {
-    /// What it counts.
+    /// The counted unit.
     measure: Measure,
     /// Units left; negative once it is overdrawn.
     left: i64,
@@ -203,8 +203,8 @@ impl Accounts {
         expired
     }
 
-    /// Returns whether a unit more of a measure may be taken, and if not, the limits that expire by it. Those
-    /// who ask again may take it: they have to end first what their accounts cannot end at once.
+    /// Returns whether a unit more of a measure may be taken, and if not, the limits that expire by it. A
+    /// second request may take it: the task first has to end forms that its accounts cannot end at once.
     pub(crate) fn admit(
         &mut self,
         id: AccountId,

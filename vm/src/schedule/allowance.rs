@@ -1,4 +1,4 @@
-//! What the cleanups of the running task may use while an abort or an expired limit waits for their end.
+//! Allowances of the cleanups of the running task while an abort or an expired limit waits for their end.
 
 use super::{Due, Scheduler};
 use crate::config::Config;

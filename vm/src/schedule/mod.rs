@@ -301,7 +301,7 @@ impl Scheduler {
         let limit = self.task_mut().extra.as_mut().and_then(|extra| extra.limits.pop());
         let Some(limit) = limit else { return };
         if let Some(extra) = &mut self.task_mut().extra {
-            // What the limit was for is done.
+            // The form of the limit has been left, so its fund is closed.
             extra.fund = extra.fund.filter(|fund| fund.depth != limit.entry as usize + 1);
         }
         if self.accounts.close_form(limit.account) {
@@ -362,8 +362,8 @@ impl Scheduler {
         slice.max(1)
     }
 
-    /// Forgets those who waited for a standard stream and do so no more: a read or a write that was aborted,
-    /// or whose time was up, would keep the run waiting for the stream.
+    /// Forgets the tasks that no longer wait for a standard stream: a read or a write that was aborted, or
+    /// whose time was up, would keep the run waiting for the stream.
     pub(crate) fn forget_left_streams(&mut self) {
         let tasks = &self.tasks;
         let is_in = |id: TaskId, state| tasks.get(id).is_some_and(|task| task.state == state);

@@ -10,11 +10,11 @@ use esl_heap::list_state;
 pub(crate) struct FailureReport {
     /// Account of what happened, and where. Calls of the library are folded.
     pub story: String,
-    /// The account with all calls of the library, if somebody may ask for it.
+    /// The account with all calls of the library, if it may be requested.
     pub full: Option<Arc<str>>,
     /// Line that says that there is no recovery.
     pub ending: String,
-    /// The account with the variables of its frames, if somebody looks at the run; and the length of that
+    /// The account with the variables of its frames, if reports are to have them; and the length of that
     /// without them.
     pub detailed: Option<(Arc<str>, usize)>,
     /// The calls that the failure has left unfinished, innermost first.

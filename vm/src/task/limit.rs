@@ -79,7 +79,7 @@ const FEWEST_LAST_TICKS: u64 = 20;
 /// Nanoseconds that go with a tick of a last allowance.
 const LAST_TIME_PER_TICK: u64 = 1000;
 
-/// What the cleanups that run for one abort, or for one expired limit, may use together.
+/// The common allowance of all cleanups that run for one abort, or for one expired limit.
 ///
 /// A fund is twice the allowance of a single cleanup, and each cleanup may use half of what is left. So the
 /// first one that hangs leaves something for those further out, and cleanups that are begun in others that

@@ -159,7 +159,7 @@ define_flags! {
     collected_for set_collected_for = 13;
 }
 
-/// What is known of the lack of room for which a task's last turn has ended.
+/// Whether a task's last turn has ended for lack of room, and the collections since.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Shortage {
     /// That was not how it ended.
@@ -196,7 +196,7 @@ pub(crate) struct Extra {
     pub values: Vec<Value>,
     /// Open limits, outermost first: one for each entry of the control stack of that kind.
     pub limits: Vec<Limit>,
-    /// What its cleanups may use together, while an abort or an expired limit has them run.
+    /// The common allowance of its cleanups, while an abort or an expired limit has them run.
     pub fund: Option<Fund>,
     /// Guards that interrupt it as soon as may be.
     pub interrupts: Vec<Value>,

@@ -80,7 +80,7 @@ impl Standstill {
         self.behind = self.behind.saturating_add(now.saturating_sub(stopped));
     }
 
-    /// Ends the rest of the task, and returns who has put it at rest.
+    /// Ends the rest of the task, and returns the task that has put it at rest.
     #[inline(always)]
     pub(crate) fn end_rest(&mut self, now: u64) -> Value {
         self.start_clock(now);

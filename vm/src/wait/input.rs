@@ -1,4 +1,4 @@
-//! Inputs: events that keep the signals that nobody has taken yet.
+//! Inputs: events that queue signals until a task takes them.
 //!
 //! A signal of an input goes to the tasks that wait for it, as that of every event; if there is none, or if
 //! earlier signals are still kept, it is kept itself. A wait that begins takes the oldest. When a signal has
@@ -122,7 +122,7 @@ pub(crate) fn when_full(heap: &Heap, input: Value) -> WhenFull {
     WhenFull::from_number(number(heap, input, RULE)).unwrap_or(WhenFull::DropOldest)
 }
 
-/// Returns whether who signals has to wait until there is room.
+/// Returns whether the signalling task has to wait until there is room.
 pub(crate) fn has_senders_wait(heap: &Heap, input: Value) -> bool {
     is_full(heap, input) && when_full(heap, input) == WhenFull::Wait
 }

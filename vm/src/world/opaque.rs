@@ -23,7 +23,7 @@ pub(crate) struct Opaques {
     numbers: GivenMap<u64, u64>,
     /// Number of those made so far.
     pub(crate) made: u64,
-    /// What is to be let go, in the order of the numbers.
+    /// The embedder's things to be released, in the order of their numbers.
     unreachable: Vec<Datum>,
 }
 
@@ -43,7 +43,8 @@ impl World {
         if let Some(number) = self.opaques.numbers.get(&(thing.identity() as u64))
             && let Some(&(object, _)) = self.opaques.held.get(number)
         {
-            // From here on somebody uses it, who may have been seen already by the cycle under way.
+            // The object is in use from here on, perhaps by a task that the cycle under way has scanned
+            // already.
             heap.mark(object);
             return Ok(object);
         }

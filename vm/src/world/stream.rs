@@ -49,7 +49,7 @@ pub(crate) enum StreamKind {
     StringOutput = 4,
     /// Anything else: the operations are in ESL, over the object in the buffer's slot.
     Custom = 5,
-    /// What functions of the library read from and write to, such as a socket or a file.
+    /// A socket, a file or the like, which functions of the library read and write.
     Channel = 6,
 }
 

@@ -53,13 +53,13 @@ const FIRST_BUFFER: usize = 24;
 pub(crate) struct StreamSource {
     /// The text.
     pub(crate) text: String,
-    /// What comes after it.
+    /// The text after it.
     pub(crate) then: Then,
     /// Whether the stream is standard input.
     pub(crate) is_console: bool,
 }
 
-/// What comes after the beginning of a text.
+/// The continuation of the beginning of a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Then {
     /// Nothing.
@@ -70,7 +70,7 @@ pub(crate) enum Then {
     Input,
 }
 
-/// What a stream is used for.
+/// The direction in which a stream is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum StreamUse {
     Reading,
@@ -287,8 +287,8 @@ fn finish_standard(vm: &mut Vm) -> Result<(), Exit> {
     Ok(())
 }
 
-/// What becomes of a program whose standard output could not be written: it fails, or if nobody reads it
-/// any more, the run ends.
+/// Checks whether standard output could be written: if not, the program fails, or if the pipe is closed, the
+/// run ends.
 fn check_output(vm: &mut Vm) -> Result<(), Exit> {
     if vm.outside.console.is_broken() {
         if vm.outside.exit_status.is_some() {

@@ -58,7 +58,7 @@ pub(in crate::builtins) fn peek_char(vm: &mut Vm, arguments: &[Value]) -> Outcom
             return Ok(Value::character(code).unwrap_or(Value::NIL));
         }
     }
-    // What was skipped stays so: whoever takes over goes on from there.
+    // Skipped characters stay skipped: the library's twin goes on from there.
     vm.exchange.charge_elements(SKIP_LIMIT);
     Err(Exit::Slowly)
 }

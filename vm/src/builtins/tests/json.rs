@@ -75,7 +75,7 @@ fn what_is_long_or_deep_is_left_to_others() {
     assert_eq!(read(&format!(" [{}]", "1,".repeat(5000)), false), "NIL ; 1 ; T");
     assert_eq!(read(&format!("\"{}\"", "x".repeat(9000)), false), "NIL ; 0 ; T");
     assert_eq!(read(&"9".repeat(9000), false), "NIL ; 0 ; T");
-    // The blanks are skipped by whoever takes over.
+    // The module `:json` skips the remaining blanks.
     assert_eq!(read(&format!("{}1", " ".repeat(9000)), false), "NIL ; 8192 ; T");
 }
 

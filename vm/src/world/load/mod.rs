@@ -144,7 +144,7 @@ pub(crate) struct ModuleLoad<M> {
     module: M,
     verification: Verification,
     verified: Option<Verified>,
-    /// What stands for functions whose code is not there yet.
+    /// The placeholder for functions whose code is not there yet.
     stub: Value,
     /// Functions by number: the Function of one without captures, the Code of one with captures.
     functions: Vec<Value>,
@@ -298,7 +298,7 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
     }
 }
 
-/// What the values of constants are made from.
+/// The sources of the values of constants.
 struct Constants<'a> {
     heap: &'a mut Heap,
     world: &'a mut World,
