@@ -11,7 +11,7 @@ use esl_compiler::reader::decode;
 use super::{NOT_COMPILED, USAGE, complain};
 use crate::program::{Program, Source};
 
-/// Size in bytes beyond which a file is refused: nobody has written that much, or it does not end at all.
+/// Size in bytes beyond which a file is refused: such a file is no source, or never ends.
 const MAX_BYTES: u64 = 64 << 20;
 
 /// Extensions of the names of sources.
@@ -53,8 +53,8 @@ pub fn read_program(path: &Path) -> Result<ProgramFile, u8> {
     })
 }
 
-/// Refuses to write to a file that is one of `inputs`, by whatever path, and to any other that is there and
-/// has the name of a source: nobody wants that lost for an output.
+/// Refuses to write to a file that is one of `inputs`, by whatever path, and to any other existing file with
+/// the name of a source, so that an output never destroys a source.
 ///
 /// # Errors
 /// The exit status, after a message.
@@ -94,7 +94,7 @@ fn is_same_file(one: &Path, other: &Path) -> bool {
 /// # Errors
 /// The first error.
 pub fn replace_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    // What a link leads to is replaced, not the link.
+    // The target of a link is replaced, not the link.
     let path = &path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".{}.tmp", std::process::id()));

@@ -10,7 +10,7 @@ use super::{USAGE, complain};
 /// Stands for a value that was left out. No argument of a process can be it.
 const ALL: &str = "\0";
 
-/// What a program may reach beside reading and writing below the current folder.
+/// Rights of a program beside reading and writing below the current folder.
 ///
 /// A value is a list with commas; without one, everything of the kind is granted.
 #[derive(Args, Clone, Debug, Default)]

@@ -1,4 +1,4 @@
-//! What shells and `man` know of the commands, made from the definitions of their arguments.
+//! Completions for shells and pages for `man`, made from the definitions of the commands' arguments.
 
 use std::path::Path;
 

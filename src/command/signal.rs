@@ -53,7 +53,7 @@ pub fn interrupt_on_signal(inbox: Inbox, end: impl Fn(ProcessSignal) + Send + 's
 pub struct SignalTarget(Arc<Mutex<Inbox>>);
 
 impl SignalTarget {
-    /// Has signals put into this inbox from now on, and those that nobody has taken so far.
+    /// Has signals put into this inbox from now on, and moves pending ones to it.
     pub fn set(&self, inbox: Inbox) {
         let mut target = self.lock();
         let left = std::mem::replace(&mut *target, inbox).take();
@@ -106,7 +106,7 @@ fn signal_of(number: i32) -> Option<ProcessSignal> {
         known::SIGUSR2 => ProcessSignal::User2,
         known::SIGTERM => ProcessSignal::Terminate,
         known::SIGWINCH => ProcessSignal::Window,
-        // What the system does for these by default is to stop the process, to let it go on, or nothing.
+        // The system's default for these is to stop the process, to let it go on, or nothing.
         known::SIGCHLD | known::SIGCONT | known::SIGURG => return None,
         known::SIGSTOP | known::SIGTSTP | known::SIGTTIN | known::SIGTTOU => return None,
         // The write fails, as it does for a full disk.

@@ -18,8 +18,8 @@ fn is_screen() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|name| name != "dumb")
 }
 
-/// Returns whether what is written to standard error may have colours, if nobody says so: it is a terminal,
-/// and the variable `NO_COLOR` is not set.
+/// Returns whether text on standard error has colours by default: it is a terminal, and the variable
+/// `NO_COLOR` is not set.
 pub fn wants_color() -> bool {
     is_screen() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

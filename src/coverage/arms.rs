@@ -29,7 +29,7 @@ pub(super) struct WrittenArm {
     pub(super) clause: NodeId,
     /// The first form in it.
     pub(super) body: NodeId,
-    /// What to call it.
+    /// Its name in reports.
     pub(super) name: String,
 }
 

@@ -25,7 +25,7 @@ pub struct CoveredFile {
 pub struct CoveredArm {
     /// Line in which the arm begins.
     pub line: u32,
-    /// What there is to say if it was never taken.
+    /// The finding if it was never taken.
     pub what: String,
     /// How often it was taken.
     pub count: u64,

@@ -73,7 +73,7 @@ where
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
         *self.waker.lock().unwrap_or_else(PoisonError::into_inner) = Some(context.waker().clone());
         if self.operation.as_ref().is_none_or(Operation::is_cancelled) {
-            // What the future holds is let go before the program hears that it has stopped.
+            // The future is dropped before the program learns that it has stopped.
             self.future = None;
             self.operation = None;
             return Poll::Ready(());

@@ -31,7 +31,7 @@ impl fmt::Debug for Function {
     }
 }
 
-/// What names a function of a program: its name, in any case, or a [`Function`].
+/// A reference to a function of a program: its name, in any case, or a [`Function`].
 pub trait Callable {
     /// Returns the function, as the machine with this inbox knows it.
     fn callee(&self, inbox: &Inbox) -> FunctionRef;

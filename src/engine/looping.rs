@@ -165,7 +165,7 @@ impl Future for Running<'_> {
     }
 }
 
-/// What an alarm is set to.
+/// The setting of an alarm.
 #[derive(Default)]
 struct AlarmSetting {
     next: Option<(Instant, Waker)>,
@@ -215,7 +215,7 @@ impl Drop for Alarm {
     }
 }
 
-/// Wakes whoever is set, until the alarm is dropped.
+/// Wakes the waker that is set when its time has come, until the alarm is dropped.
 fn keep_time(bell: &Bell) {
     let mut setting = bell.setting();
     while !setting.is_over {

@@ -21,7 +21,7 @@ use crate::module_path::ModulePath;
 use crate::program::{Ended, Program};
 use crate::timeline::Timeline;
 
-/// Prints a line. Whoever has closed the pipe wants no more of it; the exit status still tells.
+/// Prints a line, and ignores a closed pipe; the exit status states the result in any case.
 macro_rules! say {
     ($($part:tt)*) => { _ = writeln!(std::io::stdout(), $($part)*) };
 }
@@ -29,7 +29,7 @@ macro_rules! say {
 /// How to explore, and what to say of it.
 #[derive(Clone, Debug)]
 pub struct ExplorationOptions {
-    /// What is explored, but for the grain.
+    /// The settings of the exploration, except the grain.
     pub settings: Settings,
     /// The grain, if one is asked for.
     pub grain: Option<Grain>,
@@ -54,7 +54,7 @@ struct Finding {
     ends: bool,
     /// Number of switches at the end that can be repeated for ever.
     repeated: usize,
-    /// What is told of the end: the report of a deadlock or of a failure.
+    /// The report of the end: of a deadlock or of a failure.
     errors: String,
 }
 
@@ -320,7 +320,7 @@ pub fn read_schedule(path: &Path) -> Result<Schedule, u8> {
         complain(format_args!("{} cannot be read: {error}", path.display()));
         command::USAGE
     })?;
-    // What is no text is not a schedule, either: its first line says so.
+    // A file that is not text is not a schedule either, as its first line shows.
     Schedule::parse(&String::from_utf8_lossy(&bytes)).map_err(|error| {
         complain(format_args!("{} is no schedule: {error}", path.display()));
         command::USAGE

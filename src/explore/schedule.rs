@@ -64,7 +64,7 @@ pub enum ScheduleError {
     Line {
         /// Number of the line.
         line: usize,
-        /// What is expected.
+        /// The expected contents.
         expected: &'static str,
     },
 }

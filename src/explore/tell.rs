@@ -20,7 +20,7 @@ struct ToldUse<'a> {
     is_set: bool,
 }
 
-/// What happens in a schedule, as it is told: uses of variables, and switches in between.
+/// A part of the account of a schedule: uses of variables, and switches in between.
 enum Told<'a> {
     Switch(u64, &'a Switch),
     Uses(Vec<ToldUse<'a>>),
@@ -28,7 +28,7 @@ enum Told<'a> {
     Left(usize),
 }
 
-/// Returns what of a schedule is told.
+/// Returns the parts of a schedule that its account contains.
 fn told(steps: &[ScheduleStep]) -> Vec<Told<'_>> {
     let matters = uses_that_matter(steps);
     let mut told = Vec::new();
@@ -204,7 +204,8 @@ mod tests {
             told_uses(&["M:n=0", "A:n?0", "B:n?0", "B:n=1", "A:n=1"]),
             ["A reads n = 0", "B reads n = 0", "B sets n to 1", "A sets n to 1"]
         );
-        // What is set once and read from then on, and what one task uses alone.
+        // Variables that are set once and only read from then on, and those that one task uses alone, are
+        // left out.
         assert!(told_uses(&["M:n=0", "A:n?0", "B:n?0", "A:m=1", "A:m?1"]).is_empty());
         // A read before the others set.
         assert_eq!(told_uses(&["A:n?0", "A:n?0", "B:n=1"]), ["A reads n = 0", "B sets n to 1"]);

@@ -1,4 +1,4 @@
-//! What an exploration speaks of: the grain and the timers of its schedules, and what it has left out.
+//! The scope of an exploration: the grain and the timers of its schedules, and its omissions.
 //!
 //! A search that has tried everything at its grain proves something about the program only if the grain sees
 //! all that the tasks of the program share.
@@ -19,7 +19,7 @@ pub fn grains(program: &Program, wanted: Option<Grain>) -> Vec<Grain> {
     }
 }
 
-/// What a search has tried, and what it has left out.
+/// The schedules that a search has tried, and its omissions.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExplorationScope {
     /// Where points were.
@@ -28,7 +28,7 @@ pub struct ExplorationScope {
     pub timers: TimerGrain,
     /// Changes of the program that the grain does not see.
     pub unseen: Vec<UnseenChange>,
-    /// What kept the search from trying everything at this grain.
+    /// The limit that kept the search from trying everything at this grain.
     pub limit: Option<SearchLimit>,
     /// Number of different states at points.
     pub states: usize,

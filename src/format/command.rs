@@ -21,7 +21,7 @@ use crate::syntax::SyntaxTree;
 /// Deepest nesting of folders that are searched for files.
 const MAX_DEPTH: usize = 64;
 
-/// What `eslc format` is given.
+/// Arguments of `eslc format`.
 #[derive(Args, Debug)]
 pub struct FormatOptions {
     /// Source files, or folders, whose `.esl` files are meant; `-` formats standard input to standard output

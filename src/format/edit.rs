@@ -1,4 +1,4 @@
-//! What formatting changes in a text: blanks between tokens and comments.
+//! Edits by which formatting changes a text: blanks between tokens and comments.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::syntax::SyntaxKind;
 pub struct Edit {
     /// Place of the part, in bytes.
     pub place: Range<usize>,
-    /// What replaces it.
+    /// The replacement.
     pub new: String,
 }
 

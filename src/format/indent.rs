@@ -49,7 +49,7 @@ const LOOP_CLAUSES: &[&str] = &[
     "and",
 ];
 
-/// What the style of lists says about their elements.
+/// The indentation of the elements of lists, by the style of each list.
 pub(super) struct Shapes<'a> {
     pub(super) tree: &'a SyntaxTree,
     /// For each list its shape; for each mark that of what it applies to.

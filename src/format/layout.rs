@@ -36,10 +36,10 @@ pub(super) enum LayoutExtent {
     Indentation,
 }
 
-/// What precedes a piece.
+/// The blank space before a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Lead {
-    /// What the text has there.
+    /// The space in the text.
     AsIs,
     /// So many blanks.
     Blanks(usize),

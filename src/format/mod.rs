@@ -4,9 +4,9 @@
 //! Each line that does not begin inside a string or a block comment is indented by the list around its first
 //! token: arguments under the first one, bodies two columns in, distinguished arguments four. One blank
 //! divides the data of a list, parentheses stand beside what they enclose, and blank lines do not pile up.
-//! What stands between the comments `; format: off` and `; format: on` stays as it was laid out by hand. The
-//! rules of indentation are those of Emacs (`lisp-indent-function`, `common-lisp-indent-function`), with the
-//! lambda lists of macros in place of most of its table.
+//! Text between the comments `; format: off` and `; format: on` keeps its layout. The rules of indentation
+//! are those of Emacs (`lisp-indent-function`, `common-lisp-indent-function`), with the lambda lists of
+//! macros in place of most of its table.
 //!
 //! Guarantees: the reader reads the same data of both texts, and the comments are the same, in the same
 //! lists; [`format`](fn@format) compares both texts, as ruff does. Formatting again changes nothing. It takes

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::syntax::{LineStarts, NodeId, SyntaxKind, SyntaxTree};
 
-/// What a piece is.
+/// The kind of a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PieceKind {
     /// The `(` of a list, with what belongs to it, as in `#(`.

@@ -51,7 +51,7 @@ fn check_same_data(before: &str, after: &str) -> Result<(), FormatError> {
                     return Err(fault_of_difference);
                 }
             }
-            // What the reader refuses of both, such as the name of a package that is not there.
+            // The reader refuses the same in both, such as the name of a package that does not exist.
             (Some(Err(one)), Some(Err(other))) if one.code == other.code => {}
             (Some(Err(_)), _) => return Err(FormatError::Unreadable),
             _ => return Err(fault_of_difference),

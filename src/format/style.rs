@@ -143,7 +143,7 @@ impl Styles {
         let declared = parts.take(3).find_map(|form| declared(tree, form));
         let is_definer = name.trim_start_matches('%').starts_with("def");
         match declared.or_else(|| of_lambda_list(tree, lambda_list)) {
-            // What comes after the name of a definition is two columns in, whatever it is.
+            // All parts after the name of a definition are two columns in.
             Some(Indentation::Body(heads, _, rest)) if is_definer => {
                 self.shapes.insert(name, Indentation::Body(heads, 2, rest));
             }

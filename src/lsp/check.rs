@@ -26,7 +26,7 @@ const BUDGET: u64 = 50_000_000;
 /// Native stack of the thread: the compiler takes more by itself.
 const STACK: usize = 8 << 20;
 
-/// What is to be done for a text.
+/// A job of the checking thread.
 enum CheckJob {
     Check(Box<CheckedText>),
     Forget(Uri),

@@ -276,7 +276,7 @@ fn jump_at(tree: &SyntaxTree, node: NodeId, start: usize) -> Option<LocalSort> {
     }
 }
 
-/// What can be declared, and what each is for.
+/// The declarations, and the meaning of each.
 const DECLARATIONS: [(&str, &str); 11] = [
     ("ignore", "These variables are not used."),
     ("ignorable", "These variables may not be used."),

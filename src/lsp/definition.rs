@@ -1,4 +1,5 @@
-//! What a text defines at any depth: functions, macros, variables, causes and all that begins with `def`.
+//! The definitions of a text at any depth: functions, macros, variables, causes and all forms that begin with
+//! `def`.
 
 use std::ops::Range;
 
@@ -6,7 +7,7 @@ use esl_compiler::reader::lexer::Token;
 
 use crate::syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
 
-/// What a name is defined as.
+/// The kind of a definition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum DefinedAs {
     Function,

@@ -1,4 +1,4 @@
-//! What a name is: for hovering over it, and while a call is typed.
+//! Descriptions of names: for hovering, and while a call is typed.
 
 use lsp_types::{
     Documentation, Hover, HoverContents, HoverParams, MarkupContent, MarkupKind, ParameterInformation,
@@ -106,7 +106,7 @@ fn parameters_of(definition: &NameDefinition) -> Vec<String> {
     let mut data = tree.data(list);
     while let Some(node) = data.next() {
         let shown = match tree.name(node).map(bare_name).as_deref() {
-            // What no caller writes.
+            // Callers do not pass these.
             Some("&environment" | "&whole") => {
                 data.next();
                 continue;

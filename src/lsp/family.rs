@@ -16,7 +16,7 @@ pub(super) struct RenamedName {
     pub(super) new: String,
 }
 
-/// What is renamed together.
+/// The names that are renamed together.
 #[derive(Debug, Default)]
 pub(super) struct Family {
     pub(super) names: Vec<RenamedName>,
@@ -32,7 +32,7 @@ struct StructureForm {
     form: NodeId,
     name: String,
     parent: Option<String>,
-    /// What accessors begin with: the name and a hyphen, unless the definition says something else.
+    /// The prefix of accessors: the name and a hyphen, unless the definition says something else.
     prefix: String,
     has_own_prefix: bool,
     /// Names that are made from that of the structure, but accessors.

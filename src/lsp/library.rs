@@ -1,5 +1,5 @@
-//! What the language itself defines, for hover, completion and the way to its source: the library, the
-//! modules over the operating system as they are required, the builtins and the compiler's own operators.
+//! Names of the language itself, for hover, completion and go-to-definition: the library, the modules over
+//! the operating system as they are required, the builtins and the compiler's own operators.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -40,7 +40,7 @@ impl LanguageNames {
     fn collect() -> LanguageNames {
         let written = LanguageNames::written();
         let mut all = LanguageNames::default();
-        // What the reference says is right; where it was written, the sources say.
+        // The reference is authoritative for descriptions, the sources for places.
         for ReferenceEntry { name, kind, lambda_list, text } in reference::entries() {
             let places = written.find_all(&name);
             let same = places.iter().find(|place| sort_of(place.definition.kind) == sort_of(kind));
@@ -76,7 +76,7 @@ impl LanguageNames {
                 all.add(LanguageName { definition, source: Some(index), is_public: true });
             }
             for definition in definitions(&tree) {
-                // What is not in the reference is not for programs.
+                // Names outside the reference are internal.
                 all.add(LanguageName { definition, source: Some(index), is_public: false });
             }
         }

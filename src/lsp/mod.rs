@@ -63,7 +63,7 @@ use wire::{read_frame, sent, start_writer};
 pub fn serve(folders: Vec<PathBuf>) -> u8 {
     let (sender, writer) = start_writer();
     let served = session(&mut io::stdin().lock(), &sender, folders);
-    // The writing thread ends when nobody can send any more.
+    // The writing thread ends with the last sender.
     drop(sender);
     let written = writer.join().unwrap_or(Ok(()));
     match served.and_then(|status| written.map(|()| status)) {
@@ -75,7 +75,7 @@ pub fn serve(folders: Vec<PathBuf>) -> u8 {
     }
 }
 
-/// What of a session has passed.
+/// The state of a session with a client.
 struct ServedClient {
     /// The texts, once the client has said hello.
     greeted: Option<(Project, Checker)>,
@@ -104,7 +104,7 @@ fn session(input: &mut impl BufRead, sender: &mpsc::Sender<Value>, folders: Vec<
             break;
         }
     }
-    // What an end without a goodbye means: the client may have been killed.
+    // An end without `exit`: the client may have been killed.
     Ok(match session {
         ServedClient { greeted: None, .. } => {
             complain("the input ended before an `initialize` request");

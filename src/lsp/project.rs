@@ -1,4 +1,4 @@
-//! What the server knows: the open texts, the modules that they require, and how names are found in them.
+//! The server's data: the open texts, the modules that they require, and the search for names in them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

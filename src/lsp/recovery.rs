@@ -54,7 +54,7 @@ pub(super) fn hints(project: &Project, parameters: &InlayHintParams) -> Option<V
     Some(hints)
 }
 
-/// What of a text bears on failures.
+/// The parts of a text that matter for failures.
 struct FailureMap<'a> {
     tree: &'a SyntaxTree,
     /// The functions of the text.

@@ -7,7 +7,7 @@ use super::definition::DefinedAs;
 /// The chapter.
 const CHAPTER: &str = include_str!("../../docs/manual/reference.md");
 
-/// What the reference says of a name.
+/// The entry of the reference for a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct ReferenceEntry {
     /// Name without its package, in lower case.

@@ -47,12 +47,12 @@ const DEFINING_NO_FUNCTION: &[&str] = &[
     "defvar",
 ];
 
-/// What a local name is a name of: each sort has names of its own.
+/// The kind of a local name: each kind has a namespace of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LocalSort {
     Variable,
     Function,
-    /// What `return-from` leaves.
+    /// A block that `return-from` leaves.
     Block,
     /// Where `go` goes on.
     Tag,

@@ -125,7 +125,7 @@ fn read_header(input: &mut impl BufRead) -> io::Result<Option<Option<u64>>> {
         let text = String::from_utf8_lossy(&line);
         match text.trim().split_once(':') {
             Some((name, value)) if name.trim().eq_ignore_ascii_case("content-length") => {
-                // What stood before it is no header.
+                // Lines before it that were not headers are forgotten.
                 length = value.trim().parse().ok();
                 is_faulty = length.is_none();
             }

@@ -7,7 +7,7 @@
 //! assert_eq!(esl::new::new_project(&folder), 0);
 //! assert!(std::fs::read_to_string(folder.join("main.esl"))?.contains("(require \"plan\")"));
 //!
-//! // What is there already is left alone.
+//! // An existing project is left unchanged.
 //! assert_eq!(esl::new::new_project(&folder), 2);
 //! std::fs::remove_dir_all(&folder)?;
 //! # Ok::<(), std::io::Error>(())
@@ -62,7 +62,7 @@ pub fn new_project(folder: &Path) -> u8 {
     }
     let shown = folder.display().to_string();
     let is_plain = |c: char| c.is_alphanumeric() || "/._-".contains(c);
-    // What begins like an option is a folder of this one.
+    // A name that begins like an option names a folder of the current one.
     let path = if shown.starts_with('-') { format!("./{shown}") } else { shown.clone() };
     let quoted = || format!("'{}'", path.replace('\'', "'\\''"));
     let word = if path.chars().all(is_plain) { path.clone() } else { quoted() };

@@ -66,7 +66,7 @@ where
                     match identity {
                         None => converse(stream, false, visit, handler).await,
                         Some(identity) => {
-                            // Who does not speak TLS is let go.
+                            // A peer that does not speak TLS is disconnected.
                             let secured = tokio::time::timeout(HEAD_TIME, identity.accept(stream)).await;
                             if let Ok(Ok(stream)) = secured {
                                 converse(stream, true, visit, handler).await;
@@ -102,7 +102,7 @@ async fn converse<F, R>(
         .header_read_timeout(HEAD_TIME)
         .max_buf_size(HEAD)
         .serve_connection(TokioIo::new(stream), service);
-    // What the peer does wrong ends its connection.
+    // A fault of the peer ends its connection.
     drop(connection.await);
 }
 
@@ -197,7 +197,7 @@ pub(super) fn plain(status: StatusCode, text: &'static str) -> Response<HttpBody
     with(status, "text/plain; charset=utf-8", text)
 }
 
-/// Returns an answer with contents of some type, which nobody keeps.
+/// Returns an answer with contents of some type, which caches must not store.
 pub(super) fn with(
     status: StatusCode,
     content_type: &'static str,

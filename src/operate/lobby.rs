@@ -153,7 +153,7 @@ mod tests {
         // An address that has too many makes room itself.
         let one_more = lobby.enter(here);
         assert_eq!(silent.iter().position(is_over), Some(0));
-        // Those who are settled are in the way of nobody, nor are those who have gone.
+        // Settled and closed connections take no place.
         silent[1].settle();
         drop((one_more, lobby.enter(here)));
         assert!(!silent[1..].iter().any(is_over));

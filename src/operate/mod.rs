@@ -88,7 +88,7 @@ pub struct OperateOptions {
     key: Option<PathBuf>,
 }
 
-/// What serves a run. When the run is over, it tells those who watch, and is dropped.
+/// The services of a run. At the end of the run they notify viewers and operators, and are dropped.
 #[derive(Default)]
 pub struct ServedRun {
     socket: Option<PathBuf>,
@@ -109,7 +109,7 @@ const ANSWERS: Duration = Duration::from_millis(200);
 
 impl ServedRun {
     /// Tells viewers of the monitor and attached operators how the run of a machine has ended, with this exit
-    /// status and report. Those who do not listen are not waited for.
+    /// status and report, without waiting for peers that do not read.
     pub fn end(&self, machine: &Vm, ended: Ended, status: u8, report: Option<&str>) {
         let how = match ended {
             Ended::Normally(_) => "",
@@ -155,7 +155,7 @@ fn wait_until(time: Duration, holds: impl Fn() -> bool) {
 struct RunEnd {
     /// Its exit status.
     status: u8,
-    /// What is said of it.
+    /// Its description.
     said: String,
     /// The last report.
     report: Option<String>,
@@ -189,7 +189,7 @@ impl OperateOptions {
     pub fn begin(&self, machine: &mut Vm, program: &str) -> Result<ServedRun, u8> {
         let scope = RunScope::new(machine);
         let mut served = ServedRun::default();
-        // Whether an operator may come who can signal an input.
+        // Whether an operator may attach that can signal an input.
         let mut may_signal = false;
         if self.metrics.is_some() || self.listen.is_some() || self.monitor.is_some() {
             watch_closely(machine);

@@ -1,4 +1,4 @@
-//! What strangers send, without connections: for tests and fuzzing.
+//! Input from unknown peers, without connections: for tests and fuzzing.
 //!
 //! Guarantees: nothing is done; no bytes make this panic, or use more memory than a small multiple of their
 //! number.
@@ -95,7 +95,7 @@ mod tests {
         assert!(understood > inputs() / 2, "{understood}");
     }
 
-    /// What is announced takes no room before it comes, and what is nested takes no stack.
+    /// An announced length takes no memory before the data arrive, and nesting takes no stack.
     #[test]
     fn what_is_large_is_bounded_before_it_is_parsed() {
         let mut below = noise(1);

@@ -26,7 +26,7 @@ pub(super) enum OperatorRefusal {
     Argument {
         /// Name of the request.
         request: String,
-        /// What it needs.
+        /// The missing argument.
         needed: NeededArgument,
     },
     /// The action needs the number of a task.
@@ -42,7 +42,7 @@ pub(super) enum OperatorRefusal {
     NotData {
         /// The text.
         text: String,
-        /// What is wrong with it.
+        /// The fault in it.
         reason: &'static str,
     },
     /// The table of tasks has no such row.
@@ -80,7 +80,7 @@ pub(super) enum OperatorRefusal {
     OtherAnswer,
 }
 
-/// What a request needs as an argument.
+/// An argument that a request needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NeededArgument {
     /// The number of a task.

@@ -28,7 +28,7 @@ impl RunScope {
         self.memory
     }
 
-    /// Returns one who may signal and ask something.
+    /// Returns a sender for signals and questions.
     pub(super) fn sender(&self) -> Sender {
         Sender::new(&self.inbox)
     }
@@ -36,7 +36,7 @@ impl RunScope {
     /// Returns what there is to see; `None` if the machine is gone, or does not answer.
     pub(super) async fn survey(&self, request: SurveyRequest) -> Option<Survey> {
         let (tell, told) = oneshot::channel();
-        // Nobody may wait for it any more.
+        // The receiver may be gone.
         self.inbox.look(Look::Survey(request, Box::new(move |survey| drop(tell.send(survey)))));
         tokio::time::timeout(PATIENCE, told).await.ok()?.ok()
     }

@@ -1,14 +1,14 @@
-//! Roles of those who connect to a run, and the secrets by which they are known.
+//! Roles of peers that connect to a run, and the secrets that authenticate them.
 
 use std::path::Path;
 use std::{fmt, io};
 
 use subtle::{Choice, ConstantTimeEq};
 
-/// What somebody may do with a run. Each role may do what those before it may.
+/// The permissions of an operator. Each role includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum OperatorRole {
-    /// Look.
+    /// Survey the run.
     Observe,
     /// Abort, suspend and resume tasks, pause the run, signal inputs.
     Command,
@@ -105,7 +105,7 @@ impl Secrets {
     }
 
     /// Reads secrets from a file: lines of the name of a role and its secret. A role without a line has none,
-    /// so nobody has it.
+    /// so no peer can get it.
     ///
     /// # Errors
     /// The reason, if the file cannot be read, is not one of secrets, or can be read by others.

@@ -33,7 +33,7 @@ impl Profile {
 
     /// Returns one line for each stack: its frames, and what it has used.
     fn lines(&self, unit: ProfileUnit) -> Vec<String> {
-        // What separates frames and stacks cannot be part of a name.
+        // The separators of frames and stacks cannot be part of a name.
         let plain = |text: String| text.replace([';', '\n', '\r'], " ");
         let name = |&number: &usize| plain(self.frames[number].name());
         let line = |(stack, &used): (&Vec<usize>, &UsedResources)| {

@@ -38,7 +38,7 @@ const DEPTH: usize = 200;
 /// Tasks that are told apart of those that have no calls; the others count together.
 const SHORT_TASKS: usize = 100;
 
-/// What profiles tell apart by.
+/// The unit of a profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum ProfileUnit {
     /// Ticks, the same in each run
@@ -53,7 +53,7 @@ pub enum ProfileUnit {
 pub struct Profile {
     frames: Vec<ProfiledFrame>,
     numbers: HashMap<ProfiledFrame, usize>,
-    /// What was used by stack, outermost frame first: the task, the functions, the line.
+    /// The consumption by stack, outermost frame first: the task, the functions, the line.
     stacks: HashMap<Vec<usize>, UsedResources>,
     /// Number of tasks without calls that have a name of their own here.
     short_tasks: usize,
@@ -67,14 +67,14 @@ enum ProfiledFrame {
     Line(String, u32),
 }
 
-/// What a function has used.
+/// The consumption of a function.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProfiledFunction {
     /// Name of the function.
     pub name: String,
-    /// What the function itself has used.
+    /// The consumption of the function itself.
     pub own: UsedResources,
-    /// What the function has used, and all that it calls.
+    /// The consumption of the function and of all its callees.
     pub total: UsedResources,
 }
 

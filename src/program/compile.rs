@@ -145,7 +145,7 @@ fn compile_texts(
             let driven = drive_with(texts, &mut machine, &mut find);
             passages = machine.take_passages();
             driven.unwrap_or_else(|halt| {
-                // What cleanups of macros have said on the way out.
+                // The output of the cleanups of macros.
                 machine.flush();
                 let signal = machine.asked_to_end().unwrap_or(ProcessSignal::Terminate);
                 stopped = Some(match halt {

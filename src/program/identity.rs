@@ -1,4 +1,5 @@
-//! What has to be the same for a run to repeat exactly: the machine's behaviour, its tables, and the library.
+//! The identity of an execution environment: a run repeats exactly if the machine's behaviour, its tables and
+//! the library are the same.
 
 use std::fmt;
 

@@ -331,7 +331,7 @@ mod tests {
         let kept = Arc::clone(&started);
         let keep = move |operation| kept.lock().expect("nobody panics").push(operation);
         machine.add_host_function("DRIVE", HostFunction::Operation(Box::new(keep)));
-        // It never ends, and nobody waits until it does.
+        // It never ends, and no task waits for its end.
         let leaves = "(on-signal :hup (print 'hung-up)) (esl::%begin-operation 'drive () t) (exit 7)";
         assert_eq!(ends(leaves, &mut machine), Ended::Normally(7));
         assert_eq!(started.lock().expect("nobody panics").len(), 1);
@@ -340,7 +340,7 @@ mod tests {
         }
         assert!(captured.error().contains("waits for event BELL"), "{}", captured.error());
         assert_eq!(ends("(print 1)", &mut machine), Ended::Normally(0));
-        // What a task waits for may come, whoever has begun it.
+        // The awaited end may come, although an earlier program has begun the operation.
         let waits =
             "(defvar *h* (esl::%begin-operation 'drive () t)) (with-timeout 5 (operation-result *h*))";
         assert_eq!(ends(waits, &mut machine), Ended::Failed);

@@ -50,7 +50,7 @@ const fn row(names: &'static [&'static str], arguments: &'static str, does: &'st
     SessionCommand { names, arguments, does }
 }
 
-/// What a request comes to.
+/// The outcome of a request.
 type RunAnswer = Result<WireForm, RequestRefusal>;
 
 /// Where what the run says is printed.
@@ -62,7 +62,7 @@ struct SessionPrinter {
 
 impl SessionPrinter {
     fn print(&self, text: &str) {
-        // Who does not read it misses it.
+        // A closed output is ignored.
         _ = if self.is_interactive {
             self.screen.print(text.as_bytes())
         } else {
@@ -86,7 +86,7 @@ fn secret(file: Option<&Path>) -> Result<String, AttachError> {
 }
 
 /// Attaches to the run at an address, a path or a port, until the end of the input, of the run, or `:quit`.
-/// What is evaluated has these rights, as far as the run has them. Returns the exit status.
+/// Evaluated forms have these rights, as far as the run has them. Returns the exit status.
 ///
 /// # Errors
 /// The exit status, after a message, if there is no such run, or standard input cannot be read.
@@ -138,7 +138,7 @@ fn interrupt_run(wire: &Wire, typing: &Typing, inbox: Inbox) -> io::Result<()> {
     let lines = typing.other_lines();
     let signals = Inbox::new();
     let interrupts = interrupt_on_signal(signals.clone(), move |signal| {
-        // When nobody listens, the session is at its end.
+        // Without a receiver the session has ended.
         drop(lines.send(Line::Signalled(signal)));
     });
     let pass_on = move || {
@@ -209,7 +209,7 @@ struct Attached {
     end: EndOfSession,
 }
 
-/// What ended a session.
+/// The end of the connection of a session.
 struct Disconnected;
 
 impl Attached {

@@ -14,11 +14,11 @@ pub(crate) struct SessionCommand {
     pub(crate) names: &'static [&'static str],
     /// Its arguments, as they are shown.
     pub(crate) arguments: &'static str,
-    /// What it does.
+    /// Its effect.
     pub(crate) does: &'static str,
 }
 
-/// What a line is.
+/// The meaning of a line.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum LineMeaning<'a> {
     /// A form, or a part of one.
@@ -51,8 +51,8 @@ fn unknown(word: &str, commands: &[SessionCommand]) -> String {
     }
 }
 
-/// Returns the command that somebody may have meant: the only one that begins so, or one that is written
-/// alike.
+/// Returns the likely command for a mistyped one: the only one that begins so, or one with a similar
+/// spelling.
 pub(crate) fn nearest(word: &str, commands: &[SessionCommand]) -> Option<&'static str> {
     let lower = word.to_lowercase();
     let names = || commands.iter().flat_map(|command| command.names.iter().copied());

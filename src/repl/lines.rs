@@ -36,7 +36,7 @@ pub(crate) struct CompletionRequest {
 pub(crate) struct WordCompletion {
     /// The text.
     pub(crate) text: String,
-    /// What there is to say about it, in a line.
+    /// Its description, in a line.
     pub(crate) about: String,
 }
 

@@ -107,7 +107,7 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
     })?;
     let lines = typing.other_lines();
     let end = move |signal| {
-        // When nobody listens, the session is at its end.
+        // Without a receiver the session has ended.
         drop(lines.send(Line::Signalled(signal)));
     };
     let interrupts = interrupt_on_signal(machine.inbox(), end);
@@ -139,7 +139,7 @@ struct Repl {
     full: Option<String>,
 }
 
-/// What the evaluation of a text came to.
+/// The outcome of evaluating a text.
 enum Evaluated {
     /// The last form is incomplete, and nothing was evaluated.
     More,

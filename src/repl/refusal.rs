@@ -10,7 +10,7 @@ use super::attached::SECRET;
 pub(super) enum AttachError {
     /// No run can be reached at this address.
     Unreachable(String, io::Error),
-    /// Nobody has said the secret.
+    /// The secret is missing.
     NoSecret,
     /// The file with the secret cannot be read.
     SecretFile(PathBuf, io::Error),

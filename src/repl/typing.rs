@@ -89,7 +89,7 @@ impl Typing {
     }
 
     fn request(&self, request: Request) {
-        // Without the thread there is nobody to ask; `wait` reports that.
+        // The thread may have ended; `wait` reports that.
         _ = self.requests.send(request);
     }
 

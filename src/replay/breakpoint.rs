@@ -126,7 +126,7 @@ impl fmt::Display for Breakpoint {
     }
 }
 
-/// What has happened so far that the breakpoints speak of.
+/// The events so far that breakpoints refer to.
 #[derive(Debug, Default)]
 pub(super) struct Happened {
     pub(super) breakpoints: Vec<Breakpoint>,
@@ -144,7 +144,7 @@ pub(super) struct Happened {
 pub(super) struct Witness(pub(super) Arc<Mutex<Happened>>);
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What is kept is whole at every moment, so a panic elsewhere does not corrupt it.
+    // The guarded data are consistent at every moment, so a panic elsewhere does not corrupt them.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

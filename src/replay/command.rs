@@ -15,7 +15,7 @@ use super::session;
 use crate::command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain, refuse_overwriting};
 use crate::timeline::Timeline;
 
-/// What a recorded run is replayed for.
+/// Options of a replay.
 #[derive(Args, Clone, Debug)]
 pub struct ReplayOptions {
     /// Stop at a place of the run: tick:N, turn:N, time:SECONDS or failure
@@ -96,7 +96,7 @@ pub fn run(options: &ReplayOptions) -> Result<u8, u8> {
 
 /// Writes a piece of the program's output.
 pub(super) fn show(output: Output, bytes: &[u8]) {
-    // An output that nobody reads is of no interest to a replay.
+    // A closed output does not stop a replay.
     _ = match output {
         Output::Standard => std::io::stdout().lock().write_all(bytes),
         Output::Error => std::io::stderr().lock().write_all(bytes),

@@ -116,7 +116,7 @@ impl Debugger {
     /// As [`Debugger::go_to`].
     pub(super) fn add_breakpoint(&mut self, breakpoint: Breakpoint) -> Result<(), RerunError> {
         lock(&self.happened).breakpoints.push(breakpoint);
-        // What has happened is counted anew.
+        // The events are counted anew.
         let here = self.ticks();
         self.restart()?;
         self.go_to(here)
@@ -444,7 +444,7 @@ impl Debugger {
             .ok()
             .and_then(|text| machine.spawn_library("%REPL-EVALUATE", &[text]).ok());
         let Some(task) = task else { return Ok("There is no memory left for it.\n".into()) };
-        // In a run by a schedule, nobody chooses for the form.
+        // The schedule of a run does not cover the choices of the form.
         machine.end_following();
         let outcome = machine.run_until(Some(task), FORM_TICKS);
         machine.flush();

@@ -63,14 +63,14 @@ pub struct GivenFunction {
     pub needs: Vec<Need>,
 }
 
-/// What a run began with.
+/// The beginning of a run.
 #[derive(Clone, Debug)]
 pub struct Beginning {
     /// Bytes of the program, as in an `.eslb` file.
     pub program: Vec<u8>,
     /// Limits and settings.
     pub config: Config,
-    /// What was traced.
+    /// The enabled traces.
     pub traces: Vec<String>,
     /// The folders in which modules are looked for.
     pub folders: Vec<String>,
@@ -96,7 +96,7 @@ pub struct RecordedEnd {
 /// A recorded run.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// What it began with.
+    /// The beginning of the run.
     pub beginning: Beginning,
     /// The records.
     pub records: std::sync::Arc<[NotedRecord]>,
@@ -120,7 +120,7 @@ pub enum RecordedError {
     Damaged {
         /// Offset of the frame.
         offset: usize,
-        /// What is wrong.
+        /// The fault.
         problem: &'static str,
     },
     /// It was made by another build of the machine or its library.
@@ -327,7 +327,7 @@ fn read_end(content: &[u8]) -> Option<RecordedEnd> {
     from.is_empty().then_some(RecordedEnd { status, check })
 }
 
-/// What is found at some place of a file.
+/// The contents at some place of a file.
 enum FoundFrame<'a> {
     Frame(u8, &'a [u8]),
     /// A frame whose writing was interrupted.

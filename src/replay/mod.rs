@@ -62,12 +62,12 @@ pub use file::{Beginning, FORMAT, GivenFunction, MAGIC, Recorded, RecordedEnd, R
 pub use recorder::FileRecorder;
 pub use rerun::{Replayed, Rerun, RerunError};
 
-/// What a run begins with, beside its program and its host.
+/// The setup of a run, beside its program and its host.
 #[derive(Clone, Debug, Default)]
 pub struct RunSetup {
     /// Limits and settings.
     pub config: Config,
-    /// What is traced, as [`program::set_traces`] takes it.
+    /// The traces, as [`program::set_traces`] takes them.
     pub traces: Vec<String>,
     /// The folders in which `require` looks for modules.
     pub folders: Vec<String>,
@@ -163,9 +163,9 @@ pub fn beginning(program: &Program, setup: &RunSetup, machine: &Vm) -> Result<Be
 pub struct Replay {
     /// How it has ended.
     pub replayed: Replayed,
-    /// What was written to standard output.
+    /// The text on standard output.
     pub output: String,
-    /// What was written to standard error.
+    /// The text on standard error.
     pub errors: String,
     /// Ticks of all tasks.
     pub ticks: u64,

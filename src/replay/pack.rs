@@ -273,7 +273,7 @@ impl<'a> ByteReader<'a> {
                 let fits = size == Some(items.len()) && dimensions.len() != 1 && dimensions.len() < 8;
                 fits.then_some(DatumKind::Array(dimensions.into(), items.into()))?
             }
-            // What it was is gone with its process; here it is one of its own.
+            // The original is gone with its process; a new object stands for it.
             tag::OPAQUE => DatumKind::Opaque(OpaqueDatum::new(self.text()?, self.text()?, Arc::new(0_u8))),
             _ => return None,
         })

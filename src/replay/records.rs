@@ -10,7 +10,7 @@ use esl_vm::host::{
 
 use super::pack::{ByteReader, ByteWriter};
 
-/// What the next record is a difference from.
+/// The base of the difference that the next record states.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Before {
     time: u64,
@@ -92,7 +92,7 @@ pub(super) fn write(out: &mut ByteWriter, noted: &NotedRecord, before: &mut Befo
             begin(out, tag::WAITED);
             out.byte(match wake {
                 Wake::Time => 0,
-                // Nobody records that the run was looked at.
+                // Surveys are not recorded.
                 Wake::Arrival | Wake::Look => 1,
                 Wake::Never => 2,
             });

@@ -45,7 +45,7 @@ impl std::error::Error for RerunError {}
 pub enum Replayed {
     /// As the recorded run has, with this exit status.
     Equal(u8),
-    /// The recording ends here, before the run has: whoever recorded it was killed.
+    /// The recording ends here, before the run has: the recording process was killed.
     Cut,
     /// It was another run: what differs, in words.
     Diverged(String),

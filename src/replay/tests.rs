@@ -1,5 +1,4 @@
-//! What a sceptic tries: files that are cut and changed, answers that are changed, and places that are come
-//! to in all ways.
+//! Attacks on recordings: truncated and changed files, changed answers, and places reached on every path.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -351,7 +350,7 @@ fn each_changed_answer_is_a_divergence() {
         }
         for other in others {
             let text = format!("record {}: {:?} in place of {record:?}", at + 1, other.record);
-            // What is wrong in the beginning keeps the run from beginning.
+            // A fault in the beginning keeps the run from beginning.
             let Ok(mut rerun) = Rerun::begin(&with(other), |_, _| ()) else { continue };
             let Some(Replayed::Diverged(said)) = rerun.run(u64::MAX) else { panic!("{text} is not noticed") };
             assert!(said.contains("diverged at"), "{said}");
@@ -374,7 +373,7 @@ fn the_program_of_another_run_diverges() {
     assert!(said.contains("to write") && said.contains("other arguments"), "{said}");
     let mut beginning = read(&one).beginning;
     beginning.identity.push('x');
-    // What another machine has written need not be known here: that is no damage.
+    // Records of another machine may be unknown here, which is not damage.
     let mut bytes = beginning_bytes(&beginning);
     super::file::frame(&mut bytes, 2, &[255, 1, 2, 3]);
     assert_eq!(Recorded::read(&bytes).err(), Some(RecordedError::OtherMachine));

@@ -29,7 +29,7 @@ pub type NodeId = u32;
 /// Stands for no node.
 const NONE: NodeId = NodeId::MAX;
 
-/// What a node of the tree is.
+/// The kind of a node of the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SyntaxKind {
     /// The whole text.
@@ -44,7 +44,7 @@ pub enum SyntaxKind {
     Comment,
     /// `#| … |#`.
     BlockComment,
-    /// What the reader refuses: a `)` without a list, or an invisible character.
+    /// Text that the reader refuses: a `)` without a list, or an invisible character.
     Unexpected,
 }
 

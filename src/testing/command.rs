@@ -36,7 +36,7 @@ pub struct Options {
     pub coverage: Option<PathBuf>,
     /// Limits of each test.
     pub config: Config,
-    /// What of the outside a test may reach.
+    /// The rights of a test.
     pub rights: Rights,
     /// Whether a terminal is not to be told how far the tests are.
     pub is_quiet: bool,
@@ -63,7 +63,7 @@ impl Run<'_> {
     }
 }
 
-/// What became of a test.
+/// The outcome of a test.
 pub(super) struct FinishedTest {
     pub(super) verdict: Verdict,
     /// Seed with which it has failed.

@@ -51,14 +51,14 @@ const ALL_HELD: u8 = 100;
 const ONE_DID_NOT_HOLD: u8 = 101;
 const NO_CHECK: u8 = 102;
 
-/// What tests are run with.
+/// The setup of tests.
 #[derive(Clone, Debug, Default)]
 pub struct Setup {
     /// Limits of each run.
     pub config: Config,
     /// Folders in which modules are found.
     pub path: ModulePath,
-    /// What of the outside a test may reach.
+    /// The rights of a test.
     pub rights: Rights,
     /// Coverage of the program, which was compiled for it, if tests are to add to it.
     pub coverage: Option<Arc<Mutex<Coverage>>>,
@@ -98,7 +98,7 @@ pub struct ExploreOptions {
     pub states: Option<usize>,
 }
 
-/// What became of a test.
+/// The outcome of a test.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// All its checks held.
@@ -109,12 +109,12 @@ pub enum Verdict {
     Failed {
         /// Why, in a few words.
         why: String,
-        /// What it has written, reports of failures and checks included.
+        /// Its output, reports of failures and checks included.
         output: String,
     },
 }
 
-/// What a machine has written.
+/// The output of a machine.
 #[derive(Clone, Default)]
 struct Written(Arc<Mutex<Vec<u8>>>);
 

@@ -1,6 +1,6 @@
 //! Which places of a row of a drawing are free for texts.
 
-/// What covers the texts of a row, as intervals of x.
+/// The covered parts of a row, as intervals of x.
 #[derive(Clone, Default)]
 pub(super) struct Covered {
     /// In its bars: signs, bars of running, and arrows between other rows.

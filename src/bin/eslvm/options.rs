@@ -1,4 +1,4 @@
-//! What the command line takes.
+//! Arguments of the command line.
 
 use std::path::PathBuf;
 
@@ -79,7 +79,7 @@ pub(crate) enum EslvmAction {
         /// its name ends in `.svg`, for speedscope if it ends in `.json`, else a line for each stack
         #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
         profile: Option<PathBuf>,
-        /// What a flame graph, and the lines of stacks, count; data for speedscope have both
+        /// Unit of a flame graph and of lines of stacks; data for speedscope have both units
         #[arg(long, value_enum, default_value_t = ProfileUnit::Ticks, value_name = "UNIT")]
         #[arg(requires = "profile")]
         profile_unit: ProfileUnit,

@@ -18,7 +18,7 @@ use crate::figures::{print_functions, print_stats, print_tasks};
 use crate::options::{ClockChoice, MachineOptions, Stats, TierChoice};
 use crate::program::{complain_of_signal, program};
 
-/// What is to be seen of a run.
+/// The requested reports of a run.
 pub(crate) struct RunReports<'a> {
     pub(crate) stats: Option<Stats>,
     pub(crate) tier: Option<TierChoice>,

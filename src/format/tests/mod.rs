@@ -218,7 +218,7 @@ fn long_lines_are_broken_where_a_lisp_programmer_breaks_them() {
             " ".repeat(28)
         ),
     );
-    // What follows a list of several lines does not stand beside its end.
+    // A datum after a list of several lines does not stand beside its end.
     becomes(
         &format!("(some-form (and ({long} 1) ({long} 2) ({long} 3) 4) (or 5 6))"),
         &format!(

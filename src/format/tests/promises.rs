@@ -1,5 +1,5 @@
-//! What is promised of every text: its data and comments stay, and formatting it again changes nothing. Over
-//! all programs of the project, random edits of them, and random programs and texts.
+//! Guarantees for every text: its data and comments stay, and formatting it again changes nothing. Tested
+//! with all programs of the project, random edits of them, and random programs and texts.
 
 use std::path::{Path, PathBuf};
 

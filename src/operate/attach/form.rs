@@ -190,7 +190,7 @@ impl WireFormParser<'_> {
 }
 
 impl fmt::Display for WireForm {
-    // What is written is made here, or was parsed, so its depth is bounded.
+    // A form is made here or was parsed, so its depth is bounded.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             WireForm::Symbol(name) => f.write_str(name),

@@ -1,4 +1,4 @@
-//! Sessions of operators who are attached to a run: the server.
+//! Sessions of operators attached to a run: the server.
 //!
 //! The wire protocol is that of SLIME's server, SWANK: packets of forms, each request with a number, each
 //! answer with that of its request. A request says what it needs by its role; one that only looks is
@@ -41,10 +41,10 @@ use outbox::{Outbox, Outboxes};
 use packet::LARGEST;
 use session::OperatorSession;
 
-/// What `eslvm attach` calls itself when it greets a run, so that it is told how the run ends.
+/// The name of `eslvm attach` in its greeting, by which it asks to be told how the run ends.
 pub(crate) const CLIENT: &str = "eslvm attach";
 
-/// Most sessions of one role at a time, so that nobody keeps out those who may do more.
+/// Most sessions of one role at a time, so that sessions of one role cannot keep out those of another.
 const SESSIONS: usize = 16;
 /// Most requests of a session under way.
 const UNDER_WAY: usize = 16;
@@ -98,7 +98,7 @@ pub(super) fn serve(
 pub(super) struct SessionsHandle(Outboxes);
 
 impl SessionsHandle {
-    /// Has those who want to hear it told how the run has ended.
+    /// Tells the peers that have asked for it how the run has ended.
     pub(super) fn end(&self, said: &str) {
         let packet = WireForm::list([WireForm::symbol(":run-ended"), WireForm::text(said)]);
         self.0.tell_end(&packet);
@@ -120,7 +120,8 @@ const TELL: &str = "%TELL-OPERATOR";
 /// Name of the operation by which the library tells operators something when there is room for it.
 const WRITE: &str = "%WRITE-OPERATOR";
 
-/// Gives a machine that nobody attends the functions by which the library tells operators something.
+/// Gives a machine without operators the functions by which the library sends them texts; these ignore the
+/// texts.
 pub(crate) fn install_nobody(machine: &mut Vm) {
     let ignore = |_: &[Datum]| Ok(Datum::nil(Default::default()));
     machine.add_host_function(TELL, HostFunction::AtOnce(Box::new(ignore)));
@@ -128,7 +129,7 @@ pub(crate) fn install_nobody(machine: &mut Vm) {
     machine.add_host_function(WRITE, HostFunction::Operation(Box::new(ignore)));
 }
 
-/// Returns what the arguments of either function say: the outbox of a session that goes on, and a packet.
+/// Returns the arguments of either function: the outbox of a session that still exists, and a packet.
 fn told(outboxes: &Outboxes, arguments: &[Datum]) -> Option<(Outbox, WireForm)> {
     let [number, said] = arguments else { return None };
     let DatumKind::Integer(number) = number.kind() else { return None };
@@ -140,7 +141,7 @@ fn told(outboxes: &Outboxes, arguments: &[Datum]) -> Option<(Outbox, WireForm)> 
     Some((outbox, form))
 }
 
-/// Begins to send a packet, which ends when there was room for it, or when nobody waits for that any more.
+/// Begins to send a packet; the operation ends when there was room for the packet, or when it is cancelled.
 fn begin_writing(outboxes: &Outboxes, operation: HostOperation) {
     let Some((outbox, form)) = told(outboxes, operation.arguments()) else {
         return operation.complete(Vec::new());
@@ -150,7 +151,7 @@ fn begin_writing(outboxes: &Outboxes, operation: HostOperation) {
     let send = async move {
         tokio::select! {
             _ = outbox.send(&form) => {}
-            // An error says that nobody can cancel it any more, since the machine has ended.
+            // An error says that it cannot be cancelled any more, since the machine has ended.
             _ = cancelled => {}
         }
         operation.complete(Vec::new());
@@ -180,7 +181,7 @@ fn too_large(form: &WireForm) -> WireForm {
     }
 }
 
-/// What all sessions of a run share.
+/// The shared state of all sessions of a run.
 struct Attendance {
     scope: RunScope,
     outboxes: Outboxes,
@@ -267,7 +268,7 @@ type PeerWriter = Box<dyn AsyncWrite + Unpin + Send>;
 /// Returns a connection with the role that its peer has by the secret that it says.
 ///
 /// # Errors
-/// What ends the connection.
+/// The reason why the connection ends.
 async fn introduced(
     mut reader: PeerReader,
     writer: PeerWriter,
@@ -284,7 +285,7 @@ async fn introduced(
 /// Serves one connection, whose peer has a role, to its end.
 ///
 /// # Errors
-/// What ends the connection.
+/// The reason why the connection ends.
 async fn attend(
     mut reader: impl AsyncRead + Unpin,
     mut writer: impl AsyncWrite + Unpin + Send + 'static,
@@ -306,7 +307,7 @@ async fn attend(
     attendance.outboxes.enter(number, outbox.clone());
     let write = tokio::spawn(async move {
         while let Some(packet) = taken.recv().await {
-            // Who takes nothing is let go.
+            // A peer that does not read is disconnected.
             match tokio::time::timeout(PATIENCE, writer.write_all(&packet.bytes)).await {
                 Ok(Ok(())) => {}
                 _ => break,
@@ -320,7 +321,7 @@ async fn attend(
     attendance.outboxes.remove(number);
     session.end();
     drop(outbox);
-    // What is under way ends with the session, and then there is nothing more to write.
+    // Requests under way end with the session, and then there is nothing more to write.
     let stop = write.abort_handle();
     if tokio::time::timeout(FAREWELL, write).await.is_err() {
         stop.abort();
@@ -356,7 +357,7 @@ pub(super) fn understand(secrets: &Secrets, bytes: &[u8]) -> usize {
 /// Takes requests until the connection ends.
 ///
 /// # Errors
-/// What ends it.
+/// The reason why it ends.
 async fn take_requests(
     reader: &mut (impl AsyncRead + Unpin),
     session: &Arc<OperatorSession>,
@@ -365,7 +366,7 @@ async fn take_requests(
     loop {
         let text = tokio::select! {
             text = packet::read_in_time(reader, LARGEST, PATIENCE) => text?,
-            // Nobody takes the answers any more.
+            // The peer reads no answers any more.
             () = outbox.closed() => return Ok(()),
         };
         let request = match WireForm::parse(&text) {
@@ -392,7 +393,7 @@ async fn take_requests(
                 let (session, outbox) = (session.clone(), outbox.clone());
                 tokio::spawn(async move {
                     let result = session.perform(&form, &package, &thread).await;
-                    // How the run has ended is the answer for who is told that.
+                    // The report of the run's end replaces this answer for a peer that gets one.
                     if !(matches!(result, Err(OperatorRefusal::Ended)) && outbox.hears_end()) {
                         _ = outbox.send(&answer(result, number)).await;
                     }

@@ -115,7 +115,7 @@ impl Outboxes {
         self.table().insert(session, outbox);
     }
 
-    /// Tells those who want to hear it how the run has ended.
+    /// Tells the peers that have asked for it how the run has ended.
     pub(super) fn tell_end(&self, packet: &WireForm) {
         let table = self.table();
         let told = table.values().filter(|outbox| outbox.hears_end());
@@ -158,7 +158,7 @@ mod tests {
         let block = WireForm::text("x".repeat(ROOM / 8));
         let sent = (0..100).take_while(|_| sends(&outbox, &block)).count();
         assert_eq!(sent, 7);
-        // What cannot wait has a room of its own, which has an end, too.
+        // Packets that cannot wait have a room of their own, which is limited, too.
         (0..1000).for_each(|_| outbox.send_at_once(&block));
         assert_eq!(taken.len(), 7 + RESERVE / (ROOM / 8) - 1);
         drop(taken.try_recv());

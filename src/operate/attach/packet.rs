@@ -128,7 +128,7 @@ mod tests {
         });
     }
 
-    /// What is read is a form that can be written and read again; all else is refused.
+    /// An accepted packet is a form that can be written and read again; all others are refused.
     #[test]
     fn noise_is_a_form_or_refused() {
         const PIECES: [&str; 18] = [

@@ -1,4 +1,4 @@
-//! What may be asked in a session, and by whom.
+//! The requests of a session, and the role that each needs.
 
 use crate::operate::secrets::OperatorRole;
 
@@ -43,11 +43,11 @@ macro_rules! requests {
 }
 
 requests! {
-    /// What the machine is, and the role of who asks.
+    /// The description of the machine, and the role of the session.
     Connect = Observe "swank:connection-info";
     /// The tree of tasks, as a text.
     Tasks = Observe "esl:tasks";
-    /// What a task does, and its frames, as a text.
+    /// The activity of a task, and its frames, as a text.
     Backtrace = Observe "esl:backtrace";
     /// Facts, as a text.
     Facts = Observe "esl:facts";

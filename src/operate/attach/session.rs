@@ -34,7 +34,7 @@ pub(super) struct OperatorSession {
     number: u64,
     role: OperatorRole,
     scope: RunScope,
-    /// Who may signal something: as long as such a session is there, a run that waits is not deadlocked.
+    /// Permits signals: as long as such a session exists, a run that waits is not deadlocked.
     sender: Option<Sender>,
     /// Numbers of the questions that the machine has yet to answer.
     open: Mutex<BTreeSet<u64>>,
@@ -66,7 +66,7 @@ impl OperatorSession {
         if self.role >= OperatorRole::Patch
             && let Some(sender) = &self.sender
         {
-            // Nobody waits for the answer.
+            // The answer is not awaited.
             drop(sender.ask(call("%SESSION-END", vec![integer(self.number as i64)])));
         }
     }
@@ -272,12 +272,12 @@ impl OperatorSession {
             && let Some(sender) = &self.sender
         {
             let arguments = vec![integer(self.number as i64), slime::thread_of(thread), string(text)];
-            // Nobody waits for the answer.
+            // The answer is not awaited.
             drop(sender.ask(call("%SLIME-TYPED", arguments)));
         }
     }
 
-    /// What SLIME wants to know of the machine, and the role of who asks.
+    /// Returns the description of the machine for SLIME, and the role of the session.
     fn description(&self) -> WireForm {
         let plist = |rows: &[(&str, &str)]| {
             WireForm::list(rows.iter().flat_map(|(key, text)| [WireForm::symbol(key), WireForm::text(*text)]))

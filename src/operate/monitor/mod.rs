@@ -4,8 +4,8 @@
 //! events; what is done goes the other way as posts. The token is in the fragment of the address of the page,
 //! which no browser sends; the page puts it into its requests.
 //!
-//! Nothing is looked at while nobody watches. Each step looks at a bounded number of tasks; a viewer who does
-//! not take what is sent is let go.
+//! Without viewers the run is not surveyed. Each survey covers a bounded number of tasks. A viewer that does
+//! not read its events is disconnected.
 
 mod model;
 mod wish;
@@ -48,11 +48,11 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Most bytes of a post.
 const POST: usize = 64 << 10;
 
-/// What all viewers share.
+/// The shared state of all viewers.
 struct MonitorState {
     scope: RunScope,
     secrets: Secrets,
-    /// What the origin of its own page begins with.
+    /// The beginning of the origin of its own page.
     scheme: &'static str,
     model: Mutex<RunModel>,
     views: Mutex<BTreeMap<String, ViewerView>>,
@@ -86,7 +86,7 @@ impl MonitorHandle {
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What it guards is whole at every moment, so a panic elsewhere does not corrupt it.
+    // The guarded data are consistent at every moment, so a panic elsewhere does not corrupt them.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -228,7 +228,7 @@ fn events(
         if of_role >= VIEWERS {
             return plain(StatusCode::SERVICE_UNAVAILABLE, "there are too many viewers\n");
         }
-        // Who comes again is told all anew, and its last connection ends.
+        // A viewer that connects again gets everything anew, and its last connection ends.
         let coming = views.get(viewer).map_or(0, |view| view.coming) + 1;
         views.insert(
             viewer.into(),
@@ -244,7 +244,7 @@ fn events(
     let visit = visit.clone();
     tokio::spawn(async move {
         let _watching = &watching;
-        // Who may signal something keeps a run that waits from being over.
+        // A viewer that may signal keeps a waiting run from ending as deadlocked.
         let _sender = (role >= OperatorRole::Command).then(|| monitor.scope.sender());
         let mut looks = monitor.looks.subscribe();
         loop {
@@ -275,7 +275,7 @@ fn events(
     response
 }
 
-/// A viewer who watches; dropped when it goes.
+/// A connected viewer; dropped when it disconnects.
 struct Watching {
     monitor: Arc<MonitorState>,
     viewer: String,
@@ -332,7 +332,7 @@ async fn message(watching: &Watching, role: OperatorRole, asks_more: bool) -> Op
 /// Sets what a viewer sees.
 fn set_view(monitor: &MonitorState, viewer: &str, wanted: ViewerView) -> Response<HttpBody> {
     match lock(&monitor.views).get_mut(viewer) {
-        // Which failures it has been shown is not for it to say, nor who it is.
+        // The failures that it has been shown, and its identity, are not the viewer's choice.
         Some(view) => {
             *view = ViewerView { failure: view.failure, coming: view.coming, role: view.role, ..wanted }
         }
@@ -342,7 +342,7 @@ fn set_view(monitor: &MonitorState, viewer: &str, wanted: ViewerView) -> Respons
     with(StatusCode::OK, "application/json", "{}")
 }
 
-/// Does what somebody of the role for it asks for.
+/// Carries out a command of a viewer whose role permits it.
 ///
 /// # Errors
 /// Why it was not done.

@@ -1,4 +1,4 @@
-//! What the monitor knows of a run, gathered from surveys.
+//! The monitor's model of a run, gathered from surveys.
 //!
 //! A survey tells of some tasks at a time, in the order of their numbers; one round of surveys tells of all.
 //! A task that a round has passed over has ended.
@@ -18,7 +18,7 @@ const FAILURES: usize = 200;
 /// Most rows that a viewer is shown at a time.
 pub(super) const ROWS: usize = 120;
 
-/// What a viewer wants to see.
+/// The view that a viewer has chosen.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ViewerView {
     /// Whether tasks that follow each other and are alike have one row.
@@ -351,7 +351,7 @@ mod tests {
         let now = Instant::now();
         model.take(page(&[1, 2], true), 2, now);
         assert_eq!(model.cursor, 2);
-        // What the first round has told of so far is seen at once.
+        // Tasks of an unfinished first round are visible at once.
         assert_eq!(model.visible(&ViewerView { count: 10, ..ViewerView::default() }), [1, 2]);
         model.take(page(&[3, 4], true), 2, now);
         // Task 2 was named, as a viewer sees it.

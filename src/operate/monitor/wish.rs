@@ -1,4 +1,4 @@
-//! What is asked of the monitor, and by whom: taken apart, before anything is done.
+//! Requests to the monitor, parsed and authorized before anything is done.
 
 use esl_bytecode::datum::Datum;
 use hyper::header::{AUTHORIZATION, HOST, HeaderValue, ORIGIN};
@@ -11,14 +11,14 @@ use crate::operate::attach::codes_of;
 use crate::operate::refusal::OperatorRefusal;
 use crate::operate::secrets::{OperatorRole, Secrets};
 
-/// What the head of a request asks for, by somebody who may.
+/// An authorized request, as far as its head tells.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Admitted {
     /// The page.
     Page,
     /// To be told what is seen, under this name.
     Viewer(OperatorRole, String),
-    /// What the body says: to see something else, or to do something.
+    /// The body holds a change of the view, or a command.
     Post { role: OperatorRole, is_view: bool },
 }
 
@@ -37,7 +37,7 @@ pub(super) enum MonitorDeed {
     Signal(String, Datum),
 }
 
-/// What a body asks for.
+/// The request in a body.
 pub(super) enum Wish {
     /// That this viewer sees something else.
     View { viewer: String, view: ViewerView },
@@ -45,7 +45,7 @@ pub(super) enum Wish {
     Deed(Result<MonitorDeed, OperatorRefusal>),
 }
 
-/// Returns what the head of a request asks for, if who asks may.
+/// Parses and authorizes the head of a request.
 ///
 /// # Errors
 /// Why it is turned away.
@@ -98,7 +98,7 @@ fn parameter<'a>(query: &'a str, name: &str) -> &'a str {
     parts.find(|(other, _)| *other == name).map_or("", |(_, value)| value)
 }
 
-/// Returns what a body asks for, if who asks may.
+/// Parses and authorizes the body of a request.
 ///
 /// # Errors
 /// Why it is turned away.

@@ -27,7 +27,7 @@ pub(super) const VERSION: &str = "2.27";
 /// The one function that a request may be told to call for each of some rows.
 const MAPPED: &str = "swank:kill-nth-thread";
 
-/// What is to be done for a request of SLIME.
+/// The next step for a request of SLIME.
 pub(super) enum SlimeStep {
     /// It is answered.
     Answer(WireForm),
@@ -43,7 +43,7 @@ pub(super) enum SlimeStep {
 pub(super) struct SlimeCall {
     /// Name of the function.
     pub(super) function: &'static str,
-    /// What it is called with.
+    /// Its arguments.
     pub(super) arguments: Vec<Datum>,
     /// The row of the task that it is to be called with, in the table of tasks.
     pub(super) task: Option<usize>,
