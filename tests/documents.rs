@@ -1,5 +1,6 @@
 //! The documents hang together: each link among them leads to a file and a heading that exist, and the
-//! contents of the site, `docs/SUMMARY.md`, have every page.
+//! contents of the site, `docs/SUMMARY.md`, have every page. The documents of the code name nothing that its
+//! sources do not have.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -130,4 +131,73 @@ fn the_contents_of_the_site_have_every_page() {
         .collect();
     let missing: Vec<_> = pages.difference(&listed).collect();
     assert!(missing.is_empty(), "docs/SUMMARY.md leaves out {missing:?}");
+}
+
+/// Documents of the code, as opposed to those of the language.
+const OF_THE_CODE: [&str; 11] = [
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "docs/glossary.md",
+    "docs/mechanisms.md",
+    "bytecode/README.md",
+    "compiler/README.md",
+    "heap/README.md",
+    "native/README.md",
+    "stdlib/README.md",
+    "vm/README.md",
+    "world/README.md",
+];
+
+/// Returns the names in the sources of the workspace: of opcodes, functions, types, features, files.
+fn names_in_sources() -> BTreeSet<String> {
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    let (mut folders, mut names) = (vec![root().to_path_buf()], BTreeSet::new());
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("the folder can be listed") {
+            let path = entry.expect("the folder can be listed").path();
+            let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+            if path.is_dir() {
+                if file != "target" && !file.starts_with('.') {
+                    folders.push(path);
+                }
+            } else if matches!(extension, "rs" | "esl" | "toml") {
+                names.extend(file.strip_suffix(&format!(".{extension}")).map(String::from));
+                let text = fs::read_to_string(&path).expect("a source can be read");
+                names.extend(text.split(|c| !is_name(c)).filter(|word| word.len() > 1).map(String::from));
+            } else {
+                names.insert(file);
+            }
+        }
+    }
+    names
+}
+
+/// Returns the names in inline code that consist of several words: of opcodes and functions of the language
+/// (`load-const`), of functions of Rust (`take_in`) and of variants (`TurnEnd::Held`).
+fn names_in_code(text: &str) -> BTreeSet<&str> {
+    let characters = |c: char| c.is_ascii_alphanumeric() || "_-:".contains(c);
+    let is_name = |code: &&str| {
+        code.starts_with(|c: char| c.is_ascii_alphabetic())
+            && code.chars().all(characters)
+            && (code.contains(['_', '-']) || code.contains("::"))
+    };
+    let names = text.split("\n```").step_by(2).flat_map(|part| part.split('`').skip(1).step_by(2));
+    names.filter(is_name).flat_map(|name| name.split("::")).collect()
+}
+
+#[test]
+fn the_documents_of_the_code_name_what_the_sources_have() {
+    let sources = names_in_sources();
+    let mut named = 0;
+    for document in OF_THE_CODE {
+        let text = fs::read_to_string(root().join(document)).expect("the document can be read");
+        let names = names_in_code(&text);
+        named += names.len();
+        let missing: Vec<&&str> = names.iter().filter(|name| !sources.contains(**name)).collect();
+        assert!(missing.is_empty(), "{document} names {missing:?}");
+    }
+    assert!(named > 50, "only {named} names");
+    let text = "`load-const` and `A::b_c`, not `--all`, `a b-c` or\n```\n`x-y`\n```\n`z_z`";
+    assert_eq!(names_in_code(text), ["A", "b_c", "load-const", "z_z"].into());
 }
