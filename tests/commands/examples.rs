@@ -7,6 +7,7 @@ use std::process::{Child, Command};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
 
+use esl_conformance::chapter::{Example, examples};
 use esl_conformance::process;
 
 use crate::folder::Folder;
@@ -36,6 +37,37 @@ fn examples_come_to_their_end() {
         }
     }
     assert!(count >= 3, "only {count} examples");
+}
+
+/// The README shows a program of `examples/`, the command that runs it, its output and its timeline.
+#[test]
+fn the_readme_shows_a_run_of_an_example() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("README.md")).expect("it is there");
+    let commands: Vec<&str> = readme.lines().filter(|line| line.starts_with("eslvm ")).collect();
+    let [command] = commands[..] else { panic!("the README has one command, not {commands:?}") };
+    let shown = examples(&readme).expect("its blocks are closed");
+    let [(_, Example::Program { text, output: Some(output) })] = &shown[..] else { panic!("{shown:?}") };
+    let arguments: Vec<&str> = command.split_whitespace().skip(1).collect();
+    let Some(source) = arguments.last() else { panic!("{command}") };
+    let program = std::fs::read_to_string(root.join(source)).expect("the command names an example");
+    assert_eq!(*text, program, "the README and {source}");
+
+    let folder = Folder::with("readme", &[(source, text)]);
+    let run = process::run(eslvm(&arguments).current_dir(folder.path()), "");
+    assert_eq!(run.status, Some(0), "{}", run.errors);
+    assert_eq!(run.output, *output, "the output of {source}");
+    // The picture lies beside the program.
+    let picture = root.join(source).with_extension("svg");
+    let name = picture.file_name().expect("it is a file").to_string_lossy();
+    let drawn = std::fs::read_to_string(folder.join(&name)).expect("the timeline is drawn");
+    let shown = std::fs::read_to_string(&picture).expect("the picture is there");
+    assert!(
+        drawn == shown,
+        "{} is not that of the run: copy it from {}",
+        picture.display(),
+        folder.join(&name)
+    );
 }
 
 /// Under fifty seeds of faults the executive breaks no rule (its wheels are commanded by one activity at a

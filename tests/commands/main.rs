@@ -12,6 +12,7 @@ mod browser;
 mod checking;
 mod coverage;
 mod deadlock;
+mod documents;
 mod editor;
 mod editors;
 mod examples;
