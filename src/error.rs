@@ -4,8 +4,8 @@ use std::fmt;
 
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_compiler::diagnostic::{Renderer, Sources};
+use esl_host::FailureFrame;
 use esl_vm::embed::{ExportError, LibraryError};
-use esl_vm::host::FailureFrame;
 use esl_vm::load::LoadError;
 use esl_vm::run::CallError;
 

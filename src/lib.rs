@@ -53,5 +53,5 @@ pub mod timeline;
 pub use data::Data;
 pub use engine::Engine;
 pub use error::Error;
-pub use esl_vm::host;
+pub use esl_host as host;
 pub use esl_vm::vm::Config;

@@ -14,7 +14,6 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-#[cfg(feature = "world")]
 use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::compile::Required;
 use esl_bytecode::diagnostic::Diagnostic;
@@ -22,7 +21,8 @@ use esl_bytecode::file;
 use esl_bytecode::span::SourceId;
 use esl_bytecode::verify::verify;
 use esl_compiler::reader::decode;
-use esl_vm::host::Rights;
+#[cfg(feature = "world")]
+use esl_host::Rights;
 use esl_vm::load::LoadError;
 
 /// The environment variable that names further folders, separated as in `PATH`.

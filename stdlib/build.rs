@@ -17,7 +17,7 @@ use esl_bytecode::symbol::ESL_PACKAGE;
 use esl_bytecode::{file, link};
 use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_compiler::session::Compiler;
-use esl_vm::host::VirtualHost;
+use esl_host::VirtualHost;
 use esl_vm::load::LoadError;
 use esl_vm::run::CallError;
 use esl_vm::vm::{Config, Vm};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use esl_vm::host::{Right, Rights};
+use esl_host::{Right, Rights};
 
 use super::{USAGE, complain};
 

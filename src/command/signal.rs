@@ -7,7 +7,7 @@
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use esl_vm::host::{Inbox, Incoming, ProcessSignal};
+use esl_host::{Inbox, Incoming, ProcessSignal};
 
 use super::{SIGNALLED, complain};
 

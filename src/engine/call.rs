@@ -4,7 +4,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use esl_bytecode::symbol::USER_PACKAGE;
-use esl_vm::host;
+use esl_host as host;
 
 use crate::data::{Data, FromData};
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use esl_vm::host::{FunctionRef, Inbox, Kept};
+use esl_host::{FunctionRef, Inbox, Kept};
 use esl_vm::value::Value;
 
 use super::{Engine, handle};

@@ -7,10 +7,10 @@ use std::task::{Context, Poll};
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
-use esl_vm::embed::ExportError;
-use esl_vm::host::{
+use esl_host::{
     Answer, FunctionRef, Incoming, Look, Pending, ProcessSignal, Question, SendError, Sender, TaskInfo,
 };
+use esl_vm::embed::ExportError;
 use esl_vm::observe::{Coming, Observer};
 use esl_vm::vm::Vm;
 

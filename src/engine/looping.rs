@@ -7,7 +7,7 @@ use std::task::{Context, Waker};
 use std::time::{Duration, Instant};
 
 use esl_bytecode::datum::Datum;
-use esl_vm::host::{FunctionRef, Question, Sender};
+use esl_host::{FunctionRef, Question, Sender};
 use esl_vm::run::RunOutcome;
 
 use super::{Engine, Reply};

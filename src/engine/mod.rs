@@ -29,8 +29,8 @@ use std::sync::Arc;
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
+use esl_host::{Host, RealHost};
 use esl_vm::embed::HostFunction;
-use esl_vm::host::{Host, RealHost};
 use esl_vm::run::CallError;
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
@@ -301,8 +301,8 @@ fn check_name(name: &str) -> Result<(), Error> {
 
 #[cfg(test)]
 mod tests {
+    use esl_host::VirtualHost;
     use esl_vm::embed::ExportError;
-    use esl_vm::host::VirtualHost;
 
     use super::*;
 
@@ -347,7 +347,7 @@ mod tests {
         let captured = host.captured();
         let engine = Engine::with(Config::default(), Box::new(host)).expect("there is room for the library");
         let mut engine = engine.with_ticks(10_000);
-        let taken = |captured: &esl_vm::host::Captured, before: &mut usize| {
+        let taken = |captured: &esl_host::Captured, before: &mut usize| {
             let output = captured.output();
             let new = output[*before..].to_owned();
             *before = output.len();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use esl_bytecode::symbol::USER_PACKAGE;
-use esl_vm::host;
+use esl_host as host;
 
 use super::call::{Call, Failure};
 use crate::data::Data;

@@ -30,11 +30,11 @@ mod verdict;
 
 #[cfg(feature = "cli")]
 pub use command::{ExplorationOptions, read_schedule, run};
+use esl_host::{Captured, VirtualHost};
 pub use esl_vm::explore::{
     Exploration, ExploredEnding, Grain, Livelock, ScheduleEvent, ScheduleStep, SearchLimit, SearchProgress,
     Settings, StandingTask, Switch, TellStep, TimerGrain,
 };
-use esl_vm::host::{Captured, VirtualHost};
 use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Vm};
 pub use schedule::{Schedule, ScheduleError};

@@ -3,7 +3,7 @@
 use std::fmt::{Display, Write};
 use std::net::TcpListener;
 
-use esl_vm::host::{Survey, SurveyRequest, TaskStanding};
+use esl_host::{Survey, SurveyRequest, TaskStanding};
 use esl_world::{NoEventLoop, TlsIdentity};
 use hyper::{Method, StatusCode};
 
@@ -73,7 +73,7 @@ fn seconds(nanoseconds: u64) -> f64 {
 }
 
 /// A figure of an input.
-type InputFigure = fn(&esl_vm::host::InputRow) -> u64;
+type InputFigure = fn(&esl_host::InputRow) -> u64;
 
 /// Returns the figures as a text.
 fn text_of(survey: &Survey) -> String {
@@ -129,7 +129,7 @@ fn text_of(survey: &Survey) -> String {
         "Seconds of the program's clock in which all tasks waited.",
         seconds(figures.idled),
     );
-    let kept = |row: &esl_vm::host::InputRow| row.kept as u64;
+    let kept = |row: &esl_host::InputRow| row.kept as u64;
     let inputs: [(&str, &str, &str, InputFigure); 3] = [
         ("esl_input_signals_total", "counter", "Signals of an input.", |row| row.signals),
         ("esl_input_dropped_total", "counter", "Signals of an input that were dropped.", |row| row.dropped),
@@ -146,7 +146,7 @@ fn text_of(survey: &Survey) -> String {
 
 #[cfg(test)]
 mod tests {
-    use esl_vm::host::RunFigures;
+    use esl_host::RunFigures;
 
     use super::*;
 
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn the_text_is_in_the_format_to_the_letter() {
-        let input = |name: &str| esl_vm::host::InputRow {
+        let input = |name: &str| esl_host::InputRow {
             name: name.into(),
             kept: 1,
             capacity: 2,

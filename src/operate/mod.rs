@@ -49,7 +49,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use esl_vm::host::{Incoming, SurveyRequest};
+use esl_host::{Incoming, SurveyRequest};
 use esl_vm::vm::Vm;
 use esl_world::{NoEventLoop, TlsIdentity};
 

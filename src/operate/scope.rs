@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use esl_vm::host::{Inbox, Look, Sender, Survey, SurveyRequest};
+use esl_host::{Inbox, Look, Sender, Survey, SurveyRequest};
 use esl_vm::vm::Vm;
 use tokio::sync::oneshot;
 

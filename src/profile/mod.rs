@@ -189,7 +189,7 @@ impl ProfiledFrame {
 mod tests {
     use std::time::Instant;
 
-    use esl_vm::host::{RealHost, VirtualHost};
+    use esl_host::{RealHost, VirtualHost};
     use esl_vm::vm::Config;
 
     use super::*;

@@ -6,7 +6,7 @@ use esl_bytecode::span::Span;
 use esl_compiler::cover::CountedPlace;
 use esl_compiler::diagnostic::{Sources, code};
 use esl_compiler::session::{Compiler, Texts};
-use esl_vm::host::{Host, Inbox, ProcessSignal, RealHost, Rights};
+use esl_host::{Host, Inbox, ProcessSignal, RealHost, Rights};
 use esl_vm::vm::{Config, Vm};
 
 use super::run::only_compile;
@@ -174,7 +174,7 @@ fn compile_time_machine(path: &ModulePath, config: Config) -> Result<Vm, Error> 
 
 #[cfg(test)]
 mod tests {
-    use esl_vm::host::VirtualHost;
+    use esl_host::VirtualHost;
 
     use super::*;
     use crate::program::run;

@@ -4,9 +4,9 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::session::Compiler;
+use esl_host::{Host, ProcessSignal};
 use esl_vm::explore::Settings;
 use esl_vm::heap::HeapStats;
-use esl_vm::host::{Host, ProcessSignal};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::value::Value;
@@ -293,8 +293,8 @@ pub(crate) fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended 
 mod tests {
     use std::sync::{Arc, Mutex};
 
+    use esl_host::{Inbox, Look, Survey, SurveyRequest, VirtualHost};
     use esl_vm::embed::HostFunction;
-    use esl_vm::host::{Inbox, Look, Survey, SurveyRequest, VirtualHost};
     use esl_vm::observe::{Observer, Seen};
     use esl_vm::task::TaskNumber;
 

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use esl_vm::host::{Inbox, Incoming, Rights};
+use esl_host::{Inbox, Incoming, Rights};
 
 use super::commands::{LineMeaning, SessionCommand, completions_of, help, meaning_of};
 use super::lines::{CompletionRequest, Line, WordCompletion};

@@ -3,7 +3,7 @@
 use std::io::BufRead;
 use std::sync::mpsc::Sender;
 
-use esl_vm::host::ProcessSignal;
+use esl_host::ProcessSignal;
 
 /// Result of reading a line.
 pub(crate) enum Line {

@@ -32,7 +32,7 @@ use std::io::{IsTerminal, Write};
 use std::ops::ControlFlow::{self, Break, Continue};
 
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_vm::host::{Incoming, Output, RealHost, Rights, SurveyRequest};
+use esl_host::{Incoming, Output, RealHost, Rights, SurveyRequest};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::value::Value;

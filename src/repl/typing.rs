@@ -6,7 +6,7 @@
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
-use esl_vm::host::{Inbox, Incoming};
+use esl_host::{Inbox, Incoming};
 
 use super::editor::Editor;
 use super::lines::{CompletionRequest, Line, Lines, Pipe, WordCompletion};

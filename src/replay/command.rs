@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
-use esl_vm::host::Output;
+use esl_host::Output;
 
 use super::breakpoint::{Breakpoint, Target};
 use super::file::{Recorded, RecordedError};

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 
 use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::datum::Datum;
-use esl_vm::host::{FrameVariable, Output};
+use esl_host::{FrameVariable, Output};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::TaskResult;
 

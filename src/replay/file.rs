@@ -24,8 +24,8 @@
 
 use std::fmt;
 
+use esl_host::{NotedRecord, Right, RunCheck};
 use esl_vm::embed::Need;
-use esl_vm::host::{NotedRecord, Right, RunCheck};
 use esl_vm::vm::Config;
 
 use super::pack::{ByteReader, ByteWriter};
@@ -417,7 +417,7 @@ impl Recorded {
     /// Returns the last check of the records.
     pub fn last_check(&self) -> Option<RunCheck> {
         self.records.iter().rev().find_map(|noted| match noted.record {
-            esl_vm::host::Record::Checked(check) => Some(check),
+            esl_host::Record::Checked(check) => Some(check),
             _ => None,
         })
     }

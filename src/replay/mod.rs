@@ -48,7 +48,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use esl_bytecode::file::WriteError;
-use esl_vm::host::{Host, Output, RecordingHost};
+use esl_host::{Host, Output, RecordingHost};
 use esl_vm::vm::{Config, Vm};
 
 use crate::command::exit_status;

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use esl_vm::host::{NotedRecord, Recorder};
+use esl_host::{NotedRecord, Recorder};
 use esl_vm::vm::Vm;
 
 use super::file::{Beginning, RecordedEnd, Unwritten, beginning_bytes, end_bytes};

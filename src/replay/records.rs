@@ -3,7 +3,7 @@
 //! A record is a tag, the hash of the question, and what the tag says. Times are differences from the time
 //! before, and rounds from the round before: both sides keep track.
 
-use esl_vm::host::{
+use esl_host::{
     FileAnswer, FunctionRef, HostError, HostFailure, Incoming, Input, News, NotedRecord, Permit,
     ProcessSignal, Question, QuestionHash, Record, RunCheck, Wake,
 };

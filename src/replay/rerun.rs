@@ -2,9 +2,9 @@
 
 use std::fmt;
 
+use esl_host::{HostFailure, Output, ReplayHost, RunCheck};
 use esl_vm::embed::HostFunction;
 use esl_vm::explore::FollowedRun;
-use esl_vm::host::{HostFailure, Output, ReplayHost, RunCheck};
 use esl_vm::load::LoadError;
 use esl_vm::run::RunOutcome;
 use esl_vm::task::TaskId;

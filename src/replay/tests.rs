@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
-use esl_vm::host::{
+use esl_host::{
     FileAnswer, FunctionRef, HostError, HostFailure, Incoming, Input, News, NotedRecord, Permit,
     ProcessSignal, Question, QuestionHash, RealHost, Record, Rights, RunCheck, VirtualHost, Wake,
 };

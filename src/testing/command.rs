@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use esl_compiler::diagnostic::{Format, Renderer};
-use esl_vm::host::Rights;
+use esl_host::Rights;
 use esl_vm::vm::Config;
 
 use super::{Setup, Test, Verdict, junit, list, run_test, watch};

@@ -30,8 +30,8 @@ use std::cell::RefCell;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use esl_bytecode::datum::Datum;
+use esl_host::{Host, RealHost, Rights, VirtualHost};
 use esl_vm::explore::{Exploration, Grain, Settings, TimerGrain};
-use esl_vm::host::{Host, RealHost, Rights, VirtualHost};
 use esl_vm::task::TaskId;
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};

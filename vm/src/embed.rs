@@ -4,9 +4,10 @@
 use std::fmt;
 
 use esl_bytecode::datum::Datum;
+use esl_host::machine::Canary;
+use esl_host::{Host, Inbox, Incoming, Output, ProcessSignal};
 
 use crate::builtins::NATIVES;
-use crate::canary::Canary;
 use crate::compiler::Compilations;
 use crate::config::Config;
 use crate::cpu::Cpu;
@@ -15,7 +16,6 @@ use crate::datum;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
 use crate::heap::{AllocError, HeapConfig, HeapStats, Kind};
-use crate::host::{Host, Inbox, Incoming, Output, ProcessSignal};
 use crate::interp::start::make_starter;
 use crate::observe::Watch;
 use crate::outside::{Given, Outside};
@@ -85,7 +85,7 @@ impl Vm {
     /// Creates a machine without a library and with a captured outside, for the unit tests of this crate.
     #[cfg(test)]
     pub(crate) fn for_tests() -> Vm {
-        let host = Box::new(crate::host::VirtualHost::new());
+        let host = Box::new(esl_host::VirtualHost::new());
         Vm::new(Config::default(), host).expect("there is room for an empty machine")
     }
 

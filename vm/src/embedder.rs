@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use esl_bytecode::compile::SourcePlace;
+use esl_host::{Incoming, ProcessSignal};
 
 use crate::heap::Heap;
-use crate::host::{Incoming, ProcessSignal};
 use crate::task::{TaskId, TaskIndex};
 use crate::value::Value;
 

@@ -3,13 +3,13 @@
 #![deny(unsafe_code)]
 
 pub use esl_heap::{allocator, heap, value};
+pub use esl_host as host;
 
 pub(crate) use esl_heap::{character, equality, saved_pc, stack, table};
 
 pub mod builtins;
 pub mod embed;
 pub mod explore;
-pub mod host;
 pub mod observe;
 pub mod raise;
 pub mod run;
@@ -26,7 +26,6 @@ pub use world::load;
 /// due.
 pub const EXECUTION_EPOCH: u32 = 6;
 
-mod canary;
 mod compiler;
 mod config;
 mod cpu;
@@ -44,7 +43,6 @@ mod outside;
 mod overhead;
 mod report;
 mod shape;
-mod shared;
 mod snapshot;
 mod state;
 mod tier;

@@ -5,10 +5,10 @@
 //! frame above the failed instruction; nothing has been unwound. What `%raise` returns takes the place of the
 //! operation's result.
 
+use esl_host::Right;
 use smallvec::{SmallVec, smallvec};
 
 use crate::heap::{AllocError, Heap};
-use crate::host::Right;
 use crate::value::Value;
 use crate::world::World;
 use crate::world::load::LoadError;

@@ -1,10 +1,10 @@
 //! Snapshots: the state of a machine between two turns, to be had again in the same machine.
 //!
 //! A snapshot is an image of the heap, and copies of everything beside it. Large tables that seldom change
-//! are shared with the machine until they do ([`crate::shared`]), and so are the pages of the heap with
-//! another snapshot. The machine and its outside are taken apart here without `..`, by the groups of the list
-//! of all state ([`crate::state`]): a new field does not compile until it is saved, or named as one that need
-//! not be.
+//! are shared with the machine until they do ([`CopyOnWrite`](esl_host::machine::CopyOnWrite)), and so are
+//! the pages of the heap with another snapshot. The machine and its outside are taken apart here without
+//! `..`, by the groups of the list of all state ([`crate::state`]): a new field does not compile until it is
+//! saved, or named as one that need not be.
 //!
 //! Guarantees: after [`Vm::restore`] the machine goes on as it did after [`Vm::save`], to the tick.
 //!
@@ -14,13 +14,14 @@
 
 use std::collections::BTreeMap;
 
-use crate::canary::Canary;
+use esl_host::HostState;
+use esl_host::machine::{Canary, Console};
+
 use crate::config::Config;
 use crate::database::Database;
 use crate::embedder::Embedder;
 use crate::exchange::{Charges, Exchange};
 use crate::heap::HeapImage;
-use crate::host::{Console, HostState};
 use crate::lookup::Lookups;
 use crate::outside::{ExpectedOperators, Operations, Outside};
 use crate::overhead::CollectionOverhead;
@@ -201,8 +202,8 @@ impl Vm {
 
 #[cfg(test)]
 mod tests {
-    use crate::host::VirtualHost;
     use crate::vm::{Config, Vm};
+    use esl_host::VirtualHost;
 
     #[test]
     fn a_machine_returns_to_its_own_states_only() {

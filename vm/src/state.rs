@@ -22,11 +22,11 @@ use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::symbol::Symbol;
 use esl_heap::list_state;
 use esl_heap::state::{StateSink, Stated};
+use esl_host::Incoming;
 
 use crate::compiler::Compilations;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
-use crate::host::Incoming;
 use crate::observe::{Figures, Journal, Observers, Watch};
 use crate::outside::{Operations, Outside};
 use crate::overhead::CollectionOverhead;

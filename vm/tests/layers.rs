@@ -1,7 +1,7 @@
 //! The layers of the machine: each module of `vm/src` uses only modules that come before it in the list.
 //!
 //! A use is a path that begins with `crate::`, or a call of a method that a module adds to `Vm`. Unit
-//! tests may use everything. The modules that `lib.rs` takes from the heap's crate are below all others and
+//! tests may use everything. The modules that `lib.rs` takes from other crates are below all others and
 //! need no mention.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,12 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// The modules, lowest first.
 const LAYERS: &[&str] = &[
-    // Below everything: hashes, settings, the outside, promises on which unsafe code relies.
-    "shared",
-    "canary",
+    // Below everything: settings, promises on which unsafe code relies.
     "config",
     "fused",
-    "host",
     "shape",
     "tier",
     "trust",

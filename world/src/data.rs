@@ -8,7 +8,7 @@ use std::sync::Arc;
 use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
-use esl_vm::host::HostFailure;
+use esl_host::HostFailure;
 
 /// Returns the text of a string.
 pub(crate) fn text_of(datum: &Datum) -> Option<&str> {

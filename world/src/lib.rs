@@ -8,7 +8,7 @@
 //! peer, a child or the system does wrong is a failure at the call.
 //!
 //! ```
-//! use esl_vm::host::RealHost;
+//! use esl_host::RealHost;
 //! use esl_vm::vm::{Config, Vm};
 //!
 //! let mut machine = Vm::new(Config::default(), Box::new(RealHost::new(Vec::new())))?;

@@ -5,8 +5,8 @@ use std::pin::Pin;
 use std::task::{Context, Poll, ready};
 
 use esl_bytecode::datum::Datum;
+use esl_host::{HostFailure, HostOperation};
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{HostFailure, HostOperation};
 use esl_vm::vm::Vm;
 use tokio::sync::oneshot;
 

@@ -4,8 +4,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
+use esl_host::{HostFailure, Right};
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 
 use crate::data::{CallArguments, integer, nil, text};

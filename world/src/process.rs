@@ -10,8 +10,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use esl_bytecode::datum::Datum;
+use esl_host::{HostFailure, Right};
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
 use tokio::process::{Child, Command};

@@ -1,6 +1,6 @@
 //! Serial lines, as connections.
 
-use esl_vm::host::HostFailure;
+use esl_host::HostFailure;
 use tokio_serial::{DataBits, FlowControl, Parity, SerialPortBuilder, SerialPortBuilderExt, StopBits};
 
 use crate::data::{CallArguments, failure, integer};

@@ -22,8 +22,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_host::HostOperation;
 use esl_vm::embed::HostFunction;
-use esl_vm::host::HostOperation;
 use esl_vm::vm::Vm;
 use esl_world::{NoEventLoop, TlsIdentity};
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};

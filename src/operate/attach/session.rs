@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
-use esl_vm::host::{
+use esl_host::{
     Answer, FrameVariable, FunctionRef, Incoming, Question, Right, Sender, SurveyRequest, SurveyedTask,
     TaskStanding,
 };
@@ -320,15 +320,12 @@ impl OperatorSession {
         Ok(self.look(SurveyRequest::default()).await?.figures.is_paused)
     }
 
-    async fn look(&self, request: SurveyRequest) -> Result<esl_vm::host::Survey, OperatorRefusal> {
+    async fn look(&self, request: SurveyRequest) -> Result<esl_host::Survey, OperatorRefusal> {
         self.scope.survey(request).await.ok_or(OperatorRefusal::Silent)
     }
 
     /// Returns what there is to say of a task that has not ended, and its frames.
-    async fn task(
-        &self,
-        number: u64,
-    ) -> Result<(SurveyedTask, Vec<esl_vm::host::FrameRow>), OperatorRefusal> {
+    async fn task(&self, number: u64) -> Result<(SurveyedTask, Vec<esl_host::FrameRow>), OperatorRefusal> {
         let request =
             SurveyRequest { named: vec![number], frames_of: Some(number), ..SurveyRequest::default() };
         let survey = self.look(request).await?;

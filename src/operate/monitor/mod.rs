@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use esl_bytecode::datum::Datum;
-use esl_vm::host::{Answer, FrameVariable, FunctionRef, Incoming, Question, Sender, Survey, SurveyRequest};
+use esl_host::{Answer, FrameVariable, FunctionRef, Incoming, Question, Sender, Survey, SurveyRequest};
 use esl_world::{NoEventLoop, TlsIdentity};
 use http_body_util::{BodyExt, Channel, Limited};
 use hyper::header::{CONTENT_SECURITY_POLICY, HeaderValue, REFERRER_POLICY};

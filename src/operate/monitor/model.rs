@@ -6,9 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Instant;
 
-use esl_vm::host::{
-    FailureRow, InputRow, LockRow, RelationRow, RunFigures, Survey, SurveyedTask, TaskStanding,
-};
+use esl_host::{FailureRow, InputRow, LockRow, RelationRow, RunFigures, Survey, SurveyedTask, TaskStanding};
 use serde_json::{Value, json};
 
 use crate::operate::secrets::OperatorRole;

@@ -13,7 +13,7 @@ mod request;
 use std::path::Path;
 
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_vm::host::{LockRow, SurveyedTask};
+use esl_host::{LockRow, SurveyedTask};
 
 use super::attach::WireForm;
 use super::attach::datum::{boolean, integer, list, string};

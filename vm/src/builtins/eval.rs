@@ -28,6 +28,7 @@ use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file;
 use esl_bytecode::span::Span;
 use esl_bytecode::verify::verify;
+use esl_host::Host;
 
 use crate::builtins::array::{ArrayElements, vector_elements};
 use crate::builtins::expect::optional;
@@ -38,7 +39,6 @@ use crate::compiler::{ActiveCompilation, CompilerJob, FormText, FormWalk, JobId}
 use crate::datum::{DatumError, DatumWalk, Unit};
 use crate::environment;
 use crate::heap::Holder;
-use crate::host::Host;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;

@@ -3,9 +3,10 @@
 //! A builtin that waits parks its task and is done again, from the start, when the task goes on: then the
 //! task's `wait` is what it was parked at.
 
+use esl_host::ProcessSignal;
+
 use crate::builtins::list::list_items;
 use crate::heap::{Heap, Kind};
-use crate::host::ProcessSignal;
 use crate::number;
 use crate::raise::{Exit, Outcome};
 use crate::run;

@@ -1,11 +1,12 @@
 //! Files as wholes: folders, names, dates.
 
+use esl_host::{FileAnswer, FileRequest, Host, HostError, Right};
+
 use crate::builtins::expect::exactly;
 use crate::builtins::outside::UNIX_EPOCH;
 use crate::builtins::rights::demand;
 use crate::builtins::stream::file_error;
 use crate::builtins::symbol::text_of;
-use crate::host::{FileAnswer, FileRequest, Host, HostError, Right};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;

@@ -2,12 +2,12 @@
 
 use crate::builtins::operation::host_call;
 use crate::datum;
-use crate::host::{Host, HostFailure};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
+use esl_host::{Host, HostFailure};
 
 /// Seconds from the beginning of 1900 to that of 1970.
 pub(super) const UNIX_EPOCH: i64 = 2_208_988_800;

@@ -7,13 +7,14 @@
 //!
 //! [`World::rights`]: crate::world::World
 
+use esl_host::{Host, Permit, Right, Rights};
+
 use crate::builtins::LIMIT;
 use crate::builtins::expect::{exactly, optional};
 use crate::builtins::list::list_items;
 use crate::builtins::symbol::{designated_text, text_of};
 use crate::heap::Kind;
 use crate::heap::layout::SymbolObject;
-use crate::host::{Host, Permit, Right, Rights};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::task::{Binding, EntryKind};
 use crate::value::Value;

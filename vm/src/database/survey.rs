@@ -1,9 +1,10 @@
 //! Surveys of the database: relations, and facts as texts.
 
+use esl_host::RelationRow;
+
 use super::{Database, Term};
 use crate::describe::describe;
 use crate::heap::Heap;
-use crate::host::RelationRow;
 
 /// Most characters of the text of a fact.
 const CHARACTERS: usize = 500;

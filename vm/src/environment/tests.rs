@@ -307,7 +307,7 @@ fn a_program_steps_a_compilation() {
 
 #[test]
 fn data_are_read_from_streams() {
-    let host = crate::host::VirtualHost::new().with_input("ONE TW").with_input("O\nTHREE");
+    let host = esl_host::VirtualHost::new().with_input("ONE TW").with_input("O\nTHREE");
     let mut vm = Vm::new(crate::vm::Config::default(), Box::new(host)).unwrap();
     vm.set_compiler(Box::new(Toy));
     let mut read = Vec::new();

@@ -25,13 +25,13 @@ use super::live::Live;
 use super::numbers::ObjectNumbers;
 use esl_bytecode::symbol::Symbol;
 use esl_heap::state::{StateSink, Stated};
+use esl_host::machine::CopyOnWrite;
 
 use crate::fused::unfused;
 use crate::heap::{Heap, Kind};
 use crate::interp::frames::Frames;
 use crate::schedule::Grain;
 use crate::shape::{Shape, Sort};
-use crate::shared::CopyOnWrite;
 use crate::state::{VisitCourse, VisitVm};
 use crate::table::Table;
 use crate::task::{Task, TaskEnd, UnwindTarget, Unwinding};

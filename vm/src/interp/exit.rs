@@ -3,11 +3,11 @@
 //! A failure becomes a call of the library's `%raise` above the failed instruction; nothing has been unwound.
 
 use esl_bytecode::builtin::BUILTINS;
+use esl_host::Host;
 
 use super::call::{FramePlace, call, call_requested};
 use super::{Signal, aux_at, failure, word_at};
 use crate::describe::describe;
-use crate::host::Host;
 use crate::overhead::CollectionPoint;
 use crate::raise::{Exit, Raised};
 use crate::saved_pc::SavedPc;

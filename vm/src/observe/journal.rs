@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use crate::host::{FailureFrame, FailureRow, Lateness};
+use esl_host::{FailureFrame, FailureRow, Lateness};
 
 /// Failures that are kept whole.
 const RECENT: usize = 200;

@@ -16,8 +16,8 @@ pub(crate) use observer::Observers;
 pub use observer::{Coming, Observer, Seen};
 
 use esl_bytecode::compile::SourcePlace;
+use esl_host::{FrameVariable, Host};
 
-use crate::host::{FrameVariable, Host};
 use crate::schedule::Scheduler;
 use crate::task::TaskNumber;
 

@@ -9,7 +9,8 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::host::Host;
+use esl_host::Host;
+
 use crate::schedule::Scheduler;
 use crate::task::TaskNumber;
 
@@ -90,7 +91,7 @@ impl Coming {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds an observer. The machine learns of it by [`Look::Watch`](crate::host::Look::Watch).
+    /// Adds an observer. The machine learns of it by [`Look::Watch`](esl_host::Look::Watch).
     pub fn add(&self, observer: Box<dyn Observer>) {
         self.list().push(observer);
     }

@@ -8,9 +8,10 @@ use std::hash::{BuildHasherDefault, DefaultHasher};
 
 use esl_bytecode::datum::Datum;
 use esl_heap::state::{StateSink, Stated};
+use esl_host::machine::{Asked, Canceller, Console};
+use esl_host::{Host, HostFailure, HostOperation, Inbox, Output, Right};
 use indexmap::IndexMap;
 
-use crate::host::{Asked, Canceller, Console, Host, HostFailure, HostOperation, Inbox, Output, Right};
 use crate::task::TaskNumber;
 use crate::value::Value;
 pub(crate) use operations::Operations;

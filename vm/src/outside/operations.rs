@@ -1,9 +1,9 @@
 //! The operations under way, as the machine knows them.
 
 use esl_heap::list_state;
+use esl_host::machine::Canceller;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::host::Canceller;
 use crate::task::TaskNumber;
 use crate::value::Value;
 

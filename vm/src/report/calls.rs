@@ -1,9 +1,10 @@
 //! The calls in which a task stands, and what tasks have used, for profiles.
 
+use esl_host::Host;
+
 use super::tasks::place_of;
 use super::{label_of, task_label};
 use crate::describe::function_name;
-use crate::host::Host;
 use crate::interp::frames::Frames;
 use crate::observe::{OpenCalls, UsedResources};
 use crate::task::TaskState;

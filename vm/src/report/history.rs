@@ -7,11 +7,11 @@
 //! `handlers.esl`.
 
 use esl_bytecode::compile::SourcePlace;
+use esl_host::FailureFrame;
 
 use super::task_label;
 use crate::describe::describe;
 use crate::heap::AllocError;
-use crate::host::FailureFrame;
 use crate::interp::start::first_code_of;
 use crate::value::Value;
 use crate::vm::Vm;

@@ -1,10 +1,11 @@
 //! Telling observers what happens.
 
+use esl_host::FailureRow;
+
 use super::{
     arguments_label, cause_label, event_label, label_of, place_in_program, reason_of, report_in_short,
     task_label,
 };
-use crate::host::FailureRow;
 use crate::observe::{Coming, Observer, Seen};
 use crate::task::{TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;

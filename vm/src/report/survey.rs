@@ -7,15 +7,13 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use esl_bytecode::symbol::Symbol;
+use esl_host::{FrameRow, InputRow, LockRow, RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding};
 
 use super::holders::{holders_of, number_of};
 use super::label::{field_of, items};
 use super::tasks::{is_of_library, number_of_owner, place_of, program_place};
 use super::{reason_of, task_label, variable_rows};
 use crate::describe::{describe, function_name};
-use crate::host::{
-    FrameRow, InputRow, LockRow, RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
-};
 use crate::interp::frames::Frames;
 use crate::schedule::Due;
 use crate::table::Table;

@@ -1,14 +1,13 @@
 //! Reports on tasks: the deadlock report, when no task can ever run again, and the tree of all tasks.
 
-use std::collections::BTreeMap;
-
 use esl_bytecode::compile::{MODULE_SOURCES, SourcePlace};
 use esl_bytecode::word::Word;
+use esl_host::SurveyedTask;
+use esl_host::machine::task_order;
 
 use super::survey::{lock_owners, maker_of, row_of};
 use super::{event_label, lack_of, task_label};
 use crate::fused::original;
-use crate::host::{Survey, SurveyedTask};
 use crate::interp::frames::{Frame, Frames};
 use crate::interp::start::first_code_of;
 use crate::task::{Task, TaskState};
@@ -39,32 +38,6 @@ fn tail_call_in(words: &[u32]) -> Option<usize> {
         at += opcode.words();
     }
     found
-}
-
-/// Returns the order in which tasks are shown, each after its maker, with their depths in the tree. `tasks`
-/// are the numbers of each task and of its maker, in the order of the former.
-fn depths(tasks: impl Iterator<Item = (u64, u64)>) -> Vec<(usize, usize)> {
-    let mut made: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
-    let mut numbers = Vec::new();
-    let mut makers = Vec::new();
-    for (position, (number, maker)) in tasks.enumerate() {
-        made.entry(maker).or_default().push(position);
-        numbers.push(number);
-        makers.push(maker);
-    }
-    let is_there = |number: &u64| numbers.binary_search(number).is_ok();
-    let mut open: Vec<(usize, usize)> = (0..numbers.len())
-        .rev()
-        .filter(|&position| !is_there(&makers[position]))
-        .map(|root| (root, 0))
-        .collect();
-    let mut order = Vec::new();
-    while let Some((position, depth)) = open.pop() {
-        order.push((position, depth));
-        let children = made.get(&numbers[position]).map_or(&[][..], Vec::as_slice);
-        open.extend(children.iter().rev().map(|&child| (child, depth + 1)));
-    }
-    order
 }
 
 /// Returns the number of the task that a living task belongs to; 0 if that is none.
@@ -113,10 +86,10 @@ impl Vm {
             .collect();
         tasks.sort_unstable_by_key(|task| task.number);
         let owners = lock_owners(self);
-        let depths = depths(tasks.iter().map(|task| (task.number.0, maker_of(self, task))));
+        let order = task_order(tasks.iter().map(|task| (task.number.0, maker_of(self, task))));
         let mut text = String::new();
-        for (position, depth) in depths.iter().take(SHOWN_IN_TREE) {
-            text.push_str(&task_line(&row_of(self, tasks[*position], &owners), *depth));
+        for (position, depth) in order.iter().take(SHOWN_IN_TREE) {
+            text.push_str(&row_of(self, tasks[*position], &owners).line(*depth));
         }
         if tasks.is_empty() {
             text.push_str("There are no tasks.\n");
@@ -124,32 +97,6 @@ impl Vm {
             text.push_str(&format!("and {} more\n", tasks.len() - SHOWN_IN_TREE));
         }
         text
-    }
-}
-
-/// Returns the line for a task in a tree of tasks, at some depth.
-fn task_line(row: &SurveyedTask, depth: usize) -> String {
-    let state = match &row.waits_for {
-        None => "can run".to_string(),
-        Some(reason) => format!("waits for {reason}"),
-    };
-    let place = row.place.as_ref().map_or(String::new(), |place| format!(", {place}"));
-    format!("{}{} {state}{place}, {} ticks\n", "  ".repeat(depth.min(20)), row.name, row.ticks)
-}
-
-impl Survey {
-    /// Returns the order in which its tasks are shown, each after its maker, with their depths in the tree.
-    pub fn tree(&self) -> Vec<(usize, usize)> {
-        depths(self.tasks.iter().map(|row| (row.number, row.maker)))
-    }
-
-    /// Returns a text that shows its tasks as a tree, each line with the number of the task.
-    pub fn tree_text(&self) -> String {
-        let line = |(position, depth): (usize, usize)| {
-            let row = &self.tasks[position];
-            format!("{:>6}  {}", row.number, task_line(row, depth))
-        };
-        self.tree().into_iter().map(line).collect()
     }
 }
 
@@ -208,19 +155,4 @@ pub(crate) fn place_in_program<'a>(
         let code = first_code_of(task);
         place(code, tail_call_in(vm.heap.code_words(code)?).unwrap_or(0))
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::depths;
-
-    #[test]
-    fn tasks_come_after_their_makers() {
-        let tasks = [(2, 1), (4, 2), (5, 3), (7, 4), (8, 2), (9, 5)];
-        let tree: Vec<(u64, usize)> = depths(tasks.into_iter())
-            .into_iter()
-            .map(|(position, depth)| (tasks[position].0, depth))
-            .collect();
-        assert_eq!(tree, [(2, 0), (4, 1), (7, 2), (8, 1), (5, 0), (9, 1)]);
-    }
 }

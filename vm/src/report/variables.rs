@@ -3,10 +3,11 @@
 //! Only what is in scope at the place of a frame is shown, as far as the compiler has left it there. Texts of
 //! values are short, and there are not too many of them, whatever the program has.
 
+use esl_host::FrameVariable;
+
 use super::tasks::place_text;
 use crate::describe::{describe, function_name};
 use crate::heap::Kind;
-use crate::host::FrameVariable;
 use crate::interp::frames::Frame;
 use crate::value::Value;
 use crate::vm::Vm;

@@ -1,6 +1,7 @@
 //! Taking in what has come into the machine's inbox, between two turns.
 
 use esl_bytecode::datum::Datum;
+use esl_host::{Awaited, Host, Incoming, Look, ProcessSignal, Question, Wake};
 
 use super::finish::allocate_without_retry;
 use super::operation::{hear, import_list};
@@ -8,7 +9,6 @@ use super::question::{abort_call, abort_task, release, take_question};
 use super::signal::signal;
 use super::spawn::{SpawnOptions, make_task};
 use super::wake::make_runnable;
-use crate::host::{Awaited, Host, Incoming, Look, ProcessSignal, Question, Wake};
 use crate::outside::ExpectedOperators;
 use crate::task::{TaskNumber, TaskState};
 use crate::value::Value;

@@ -3,10 +3,10 @@
 use std::fmt;
 
 use esl_bytecode::datum::Datum;
+use esl_host::FailureFrame;
 
 use super::RunOutcome;
 use super::ending::end_task;
-use crate::host::FailureFrame;
 use crate::observe::Seen;
 use crate::report;
 use crate::task::{Task, TaskEnd, TaskId, TaskResult};

@@ -4,8 +4,9 @@
 //! Guarantees: every task is aborted, newest first, and its cleanups run within their allowance; operations
 //! that are under way are cancelled, and have as much time to stop. An interrupt cuts that short.
 
+use esl_host::{Awaited, Host};
+
 use super::{RunOutcome, run_tasks, take_in};
-use crate::host::{Awaited, Host};
 use crate::report;
 use crate::task::{TaskId, TaskState};
 use crate::vm::Vm;

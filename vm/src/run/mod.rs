@@ -46,11 +46,12 @@ pub(crate) use spawn::{SpawnOptions, make_task};
 pub(crate) use timers::idle;
 pub(crate) use turn::{give_turn, go_on_with_turn};
 
+use esl_host::{Awaited, Host, RunCheck};
+
 use abort::abort_more;
 use operation::expects_news;
 use timers::{go_on_in_time, look_at_clock};
 
-use crate::host::{Awaited, Host, RunCheck};
 use crate::task::{TaskId, TaskIndex, TaskState};
 use crate::vm::Vm;
 
@@ -65,7 +66,7 @@ pub enum RunOutcome {
     BudgetSpent,
     /// The ticks that this call was given are used up.
     TicksUsed,
-    /// [`Incoming::Stop`](crate::host::Incoming::Stop) has come into the inbox, or an interrupt that cuts the
+    /// [`Incoming::Stop`](esl_host::Incoming::Stop) has come into the inbox, or an interrupt that cuts the
     /// end of the run short.
     Stopped,
 }

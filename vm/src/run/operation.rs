@@ -2,7 +2,6 @@
 
 use super::finish::allocate_without_retry;
 use crate::datum;
-use crate::host::News;
 use crate::outside::ExpectedOperators;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -10,6 +9,7 @@ use crate::wait::{event, operation};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
+use esl_host::News;
 
 /// Returns whether something may come into the inbox that lets a waiting task go on: a signal of an input, or
 /// news of an operation whose handle a task waits for. News of others, such as one that an earlier program

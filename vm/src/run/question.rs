@@ -2,11 +2,11 @@
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
+use esl_host::{Answer, FunctionRef, Incoming, Kept, Question, TaskInfo};
 
 use super::finish::allocate_without_retry;
 use super::spawn::{SpawnOptions, spawn_kept};
 use crate::datum::{self, DatumError};
-use crate::host::{Answer, FunctionRef, Incoming, Kept, Question, TaskInfo};
 use crate::report;
 use crate::task::{DEFAULT_PRIORITY, HIGHEST_PRIORITY, Task, TaskEnd, TaskId, TaskNumber, TaskState};
 use crate::value::Value;

@@ -3,12 +3,13 @@
 //! Virtual time stands still while tasks run. It moves when all of them wait, to the first time for which one
 //! does, and when so many ticks have run that something else must be meant to happen.
 
+use esl_host::{Awaited, Host, Wake};
+
 use super::arrival::{serve_looks, wait_in_host, wake_readers};
 use super::limit::expire_in_time;
 use super::operation::{expects_news, say_what_operators_can_do};
 use super::tell_how_far;
 use super::wake::{call_attention, make_runnable};
-use crate::host::{Awaited, Host, Wake};
 use crate::schedule::{Due, Scheduler};
 use crate::task::Task;
 use crate::vm::Vm;

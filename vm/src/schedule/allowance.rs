@@ -1,8 +1,9 @@
 //! Allowances of the cleanups of the running task while an abort or an expired limit waits for their end.
 
+use esl_host::Host;
+
 use super::{Due, Scheduler};
 use crate::config::Config;
-use crate::host::Host;
 use crate::task::{Allowance, Fund};
 
 impl Scheduler {

@@ -1,6 +1,6 @@
 //! Readings of the host's clock.
 
-use crate::host::Host;
+use esl_host::Host;
 
 /// When the clock was read, and what it said.
 #[derive(Clone, Copy, Debug, Default)]

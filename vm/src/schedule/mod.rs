@@ -32,7 +32,8 @@ pub(crate) use queues::RunQueues;
 pub(crate) use timer::{Due, Timer, Timers};
 pub(crate) use turn::{Parking, Turn, TurnEnd};
 
-use crate::canary::Canary;
+use esl_host::machine::Canary;
+
 use crate::config::Config;
 use crate::heap::Heap;
 use crate::raise::{Exit, Outcome};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::host::FailureFrame;
 use esl_heap::list_state;
+use esl_host::FailureFrame;
 
 /// Report of a failure.
 #[derive(Clone, Debug)]

@@ -20,12 +20,12 @@ use std::sync::Arc;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, UNINTERNED_NUMBERS};
+use esl_host::machine::CopyOnWrite;
 use indexmap::IndexMap;
 
 use crate::heap::layout::SymbolObject;
 use crate::heap::{AllocError, Heap, Holder, Kind};
 use crate::shape::{Shape, Sort};
-use crate::shared::CopyOnWrite;
 use crate::trust;
 use crate::value::Value;
 pub(crate) use builtin_index::find_builtin;

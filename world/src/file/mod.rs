@@ -15,8 +15,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
+use esl_host::{FileAnswer, FileRequest, HostError, HostFailure, Right, request_of_files};
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{FileAnswer, FileRequest, HostError, HostFailure, Right, request_of_files};
 use esl_vm::vm::Vm;
 
 use crate::data::{CallArguments, Numbered, boolean, failure, handle, integer, nil, text};

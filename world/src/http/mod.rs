@@ -15,7 +15,7 @@ mod target;
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
-use esl_vm::host::HostFailure;
+use esl_host::HostFailure;
 use esl_vm::vm::Vm;
 use hyper::HeaderMap;
 use hyper::header::{HeaderName, HeaderValue};

@@ -13,8 +13,8 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use esl_bytecode::datum::Datum;
+use esl_host::{HostFailure, Right};
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use http_body_util::{BodyExt, Full};
 use hyper::body::{Body, Incoming};

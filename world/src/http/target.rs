@@ -1,8 +1,8 @@
 //! Targets of requests: what a URL says, by the rules of browsers, and the parts of a target that has come.
 
 use esl_bytecode::datum::Datum;
+use esl_host::HostFailure;
 use esl_vm::embed::HostFunction;
-use esl_vm::host::HostFailure;
 use esl_vm::vm::Vm;
 use url::{ParseError, Url};
 

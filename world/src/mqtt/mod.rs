@@ -13,8 +13,8 @@ use std::time::Duration;
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
+use esl_host::{HostFailure, Right};
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use rumqttc::{
     AsyncClient, ConnectionError, Event, EventLoop, LastWill, MqttOptions, Outgoing, Packet, QoS,

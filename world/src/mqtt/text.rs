@@ -4,7 +4,7 @@
 //! express.
 //! Source: MQTT 3.1.1, sections 1.5.3 and 4.7.
 
-use esl_vm::host::HostFailure;
+use esl_host::HostFailure;
 
 use super::mqtt_failure;
 

@@ -16,7 +16,7 @@ use std::task::{Context, Poll, Wake, Waker, ready};
 use std::time::Duration;
 
 use esl_bytecode::datum::Datum;
-use esl_vm::host::HostFailure;
+use esl_host::HostFailure;
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, ReadBuf};
 use tokio::net::TcpStream;
 

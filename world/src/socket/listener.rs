@@ -5,7 +5,7 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
-use esl_vm::host::HostFailure;
+use esl_host::HostFailure;
 use tokio::net::{TcpListener, TcpSocket};
 
 use super::{Connection, NewConnection, SocketKind, Sockets, lock, socket_failure, unless_closed};

@@ -15,8 +15,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
+use esl_host::{HostFailure, Right};
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use tokio::net::UdpSocket;
 use tokio::sync::watch;

@@ -1,11 +1,12 @@
 //! Files of the host as a whole: their texts and bytes, whether they are there.
 
+use esl_host::{Host, HostError, Right, WriteMode};
+
 use crate::builtins::array::{ArrayElements, vector_elements};
 use crate::builtins::expect::{exactly, optional};
 use crate::builtins::rights::demand;
 use crate::builtins::symbol::text_of;
 use crate::exchange::Exchange;
-use crate::host::{Host, HostError, Right, WriteMode};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;

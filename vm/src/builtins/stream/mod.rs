@@ -5,14 +5,16 @@
 //! builtins leave it to their twins. Output to a string is gathered in strings that never grow, so that the
 //! millionth character takes as long as the first. Every output stream knows its column.
 
+use esl_host::machine::{Taken, column_after, encode};
+use esl_host::{Host, Output};
+
 use crate::builtins::COPY_LIMIT;
 use crate::builtins::array::{ArrayElements, vector_elements};
-use crate::builtins::expect::optional;
+use crate::builtins::expect::{exactly, optional};
 use crate::builtins::symbol::text_between;
 use crate::equality::characters_of;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Kind};
-use crate::host::{Host, Output, Taken, column_after, encode};
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::run;
 use crate::schedule::Parking;
@@ -20,8 +22,6 @@ use crate::task::TaskEnd;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::stream::{StreamKind, make_stream, slot};
-
-use super::expect::exactly;
 
 mod channel;
 mod file;

@@ -1,5 +1,6 @@
+use esl_host::{Rights, VirtualHost};
+
 use super::{check_all, evaluate};
-use crate::host::{Rights, VirtualHost};
 use crate::vm::{Config, Vm};
 
 #[test]

@@ -14,9 +14,9 @@ use esl_bytecode::module::{
 };
 use esl_bytecode::opcode::{OPCODES, Opcode};
 use esl_bytecode::symbol::Symbol;
+use esl_host::VirtualHost;
 
 use crate::describe::describe;
-use crate::host::VirtualHost;
 use crate::value::Value;
 use crate::vm::{Config, Vm};
 use crate::world::load::{Alone, load};

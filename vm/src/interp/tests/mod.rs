@@ -4,9 +4,9 @@ use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, Par
 use esl_bytecode::opcode::{Instr, OPCODES};
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
+use esl_host::VirtualHost;
 
 use crate::fused::FUSED;
-use crate::host::VirtualHost;
 use crate::run::RunOutcome;
 use crate::task::TaskResult;
 use crate::value::Value;

@@ -173,7 +173,7 @@ fn classes_of_an_image_are_made_when_their_names_are_met_parents_first() {
 #[test]
 fn collections_do_not_harm_what_is_loaded() {
     let config = crate::vm::Config { collect_always: true, ..Default::default() };
-    let mut vm = Vm::new(config, Box::new(crate::host::VirtualHost::new())).unwrap();
+    let mut vm = Vm::new(config, Box::new(esl_host::VirtualHost::new())).unwrap();
     let toplevel = vm.load_module(&module()).unwrap();
     check_loaded(&mut vm, toplevel);
     let image = image(&module());

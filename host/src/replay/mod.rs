@@ -10,12 +10,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 
-use crate::host::record::{
+use crate::record::{
     Arguments, BrokenOutput, Called, Due, Exists, FileRead, Filed, Interactive, Monotonic, NotedRecord,
     PassedOn, Permitted, ProcessorTime, QuestionHash, Read, Received, Record, RecordedAnswer, Seed, Virtual,
     Waited, WallClock, Written,
 };
-use crate::host::{
+use crate::{
     Awaited, Captured, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output,
     Permit, ProcessSignal, Right, Rights, RunCheck, Wake, WriteMode,
 };

@@ -10,16 +10,17 @@ use esl_heap::state::{StateSink, Stated};
 
 /// A value, copied when it is changed while there is another copy.
 #[derive(Debug, Default)]
-pub(crate) struct CopyOnWrite<T>(Arc<T>);
+pub struct CopyOnWrite<T>(Arc<T>);
 
 impl<T> CopyOnWrite<T> {
     /// Creates a value of which there is no copy.
-    pub(crate) fn new(value: T) -> CopyOnWrite<T> {
+    pub fn new(value: T) -> CopyOnWrite<T> {
         CopyOnWrite(Arc::new(value))
     }
 }
 
 impl<T> Clone for CopyOnWrite<T> {
+    #[inline]
     fn clone(&self) -> CopyOnWrite<T> {
         CopyOnWrite(self.0.clone())
     }
@@ -28,12 +29,14 @@ impl<T> Clone for CopyOnWrite<T> {
 impl<T> Deref for CopyOnWrite<T> {
     type Target = T;
 
+    #[inline]
     fn deref(&self) -> &T {
         &self.0
     }
 }
 
 impl<T: Clone> DerefMut for CopyOnWrite<T> {
+    #[inline]
     fn deref_mut(&mut self) -> &mut T {
         Arc::make_mut(&mut self.0)
     }

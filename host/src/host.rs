@@ -1,55 +1,17 @@
-//! The outside of the virtual machine, as a trait: clocks, standard streams, files, arguments, and the inbox
-//! for everything that comes unasked.
+//! The host as a trait: clocks, standard streams, files, arguments, and the inbox for unrequested events.
 //!
-//! Guarantees: nothing else in this crate names clocks, files, threads, the environment or randomness (a test
-//! checks this), so a run depends only on the program, the seed and the answers of its host. All functions
-//! here return plain data, so a host can be recorded ([`RecordingHost`]) and replayed ([`ReplayHost`]).
+//! All functions here return plain data, so a host can be recorded ([`RecordingHost`](super::RecordingHost))
+//! and replayed ([`ReplayHost`](super::ReplayHost)).
 //!
 //! Not here: when the host is asked. The machine asks whether timers are due, and looks into the inbox,
 //! between two turns.
-//!
-//! A host decides what it makes available. What a program may reach is granted ([`Rights`]): the machine asks
-//! for a permit before each request that needs a right, and the host carries out what it is asked for then.
-//! [`VirtualHost`] has only the files that it was given.
 
 use std::any::Any;
 use std::fmt;
 
 use esl_bytecode::datum::Datum;
 
-mod asked;
-mod console;
-mod door;
-mod inbox;
-mod look;
-mod operation;
-mod question;
-mod real;
-#[cfg(unix)]
-mod real_output;
-mod record;
-mod replay;
-mod rights;
-mod signal;
-mod virtual_host;
-
-pub(crate) use asked::Asked;
-pub(crate) use console::{Console, Taken, column_after, encode};
-pub use door::{SendError, Sender};
-pub use inbox::{Inbox, Incoming};
-pub use look::{
-    FailureFrame, FailureRow, FrameRow, FrameVariable, InputRow, Lateness, LockRow, Look, RelationRow,
-    RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
-};
-pub(crate) use operation::Canceller;
-pub use operation::{HostFailure, HostOperation, News};
-pub use question::{Answer, FunctionRef, Kept, Pending, Question, TaskInfo};
-pub use real::{RealHost, Screen, request_of_files};
-pub use record::{NotedRecord, QuestionHash, Record, Recorder, Recording, RecordingHost};
-pub use replay::{Divergence, ReplayHost};
-pub use rights::{Permit, Right, Rights};
-pub use signal::ProcessSignal;
-pub use virtual_host::{Captured, VirtualHost};
+use super::{HostFailure, Inbox, Incoming, Permit, Right, Rights};
 
 /// A stream that bytes are written to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

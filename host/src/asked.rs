@@ -34,30 +34,30 @@ enum AskedQuestion {
 }
 
 /// A machine's host, and the canary of the questions that it was asked.
-pub(crate) struct Asked {
+pub struct Asked {
     host: Box<dyn Host + Send>,
     canary: Canary,
 }
 
 impl Asked {
     /// Counts the questions to `host` from here on.
-    pub(crate) fn new(host: Box<dyn Host + Send>) -> Asked {
+    pub fn new(host: Box<dyn Host + Send>) -> Asked {
         Asked { host, canary: Canary::default() }
     }
 
     /// Returns a state, with the canary, for [`Asked::restore_all`]; `None` if the host has none.
-    pub(crate) fn save_all(&self) -> Option<(HostState, Canary)> {
+    pub fn save_all(&self) -> Option<(HostState, Canary)> {
         Some((self.host.save()?, self.canary))
     }
 
     /// Returns to a state. Returns whether the host did.
-    pub(crate) fn restore_all(&mut self, (state, canary): &(HostState, Canary)) -> bool {
+    pub fn restore_all(&mut self, (state, canary): &(HostState, Canary)) -> bool {
         self.canary = *canary;
         self.host.restore(state)
     }
 
     /// Returns the canary of the questions so far.
-    pub(crate) fn canary(&self) -> Canary {
+    pub fn canary(&self) -> Canary {
         self.canary
     }
 
@@ -259,7 +259,7 @@ impl Host for Asked {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::host::VirtualHost;
+    use crate::VirtualHost;
     use esl_bytecode::span::Span;
 
     #[test]

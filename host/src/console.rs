@@ -21,7 +21,7 @@ const BLOCK: usize = 1 << 14;
 
 /// The standard streams.
 #[derive(Clone, Default)]
-pub(crate) struct Console {
+pub struct Console {
     output: Vec<u8>,
     /// What there was no room for on standard error. While there is anything, no more is written to standard
     /// output, whose buffer was empty then.
@@ -42,7 +42,7 @@ pub(crate) struct Console {
 
 /// The outcome of taking something from standard input.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Taken<T> {
+pub enum Taken<T> {
     /// It was there.
     Next(T),
     /// It has not arrived yet.
@@ -67,7 +67,7 @@ list_state! { Console {
 
 impl Console {
     /// Writes characters.
-    pub(crate) fn write(&mut self, host: &mut dyn Host, output: Output, characters: &[u32]) {
+    pub fn write(&mut self, host: &mut dyn Host, output: Output, characters: &[u32]) {
         let column = &mut self.columns[output as usize];
         *column = column_after(*column, characters);
         match output {
@@ -94,7 +94,7 @@ impl Console {
     }
 
     /// Returns whether a task may write to a stream now, and need not wait.
-    pub(crate) fn has_room(&mut self, host: &mut dyn Host, output: Output) -> bool {
+    pub fn has_room(&mut self, host: &mut dyn Host, output: Output) -> bool {
         let limit = if output == Output::Standard { BLOCK } else { 1 };
         if self.errors.is_empty() && self.output.len() < limit {
             return true;
@@ -104,12 +104,12 @@ impl Console {
     }
 
     /// Returns whether something waits until there is room for it.
-    pub(crate) fn is_behind(&self) -> bool {
+    pub fn is_behind(&self) -> bool {
         !self.errors.is_empty() || !self.output.is_empty()
     }
 
     /// Writes the buffers, as far as there is room.
-    pub(crate) fn pass_on(&mut self, host: &mut dyn Host) {
+    pub fn pass_on(&mut self, host: &mut dyn Host) {
         if !self.errors.is_empty() {
             // If standard error is gone, there is no other stream for the error.
             let count = host.write_ready(Output::Error, &self.errors).unwrap_or(self.errors.len());
@@ -137,17 +137,17 @@ impl Console {
     }
 
     /// Turns the hash of everything written to standard output on, from zero, or off.
-    pub(crate) fn note_all(&mut self, on: bool) {
+    pub fn note_all(&mut self, on: bool) {
         self.noted = on.then_some(0);
     }
 
     /// Returns the hash of everything written to standard output.
-    pub(crate) fn noted(&self) -> u64 {
+    pub fn noted(&self) -> u64 {
         self.noted.unwrap_or(0)
     }
 
     /// Writes the buffers, and waits until there is room for that.
-    pub(crate) fn flush(&mut self, host: &mut dyn Host) {
+    pub fn flush(&mut self, host: &mut dyn Host) {
         if !self.errors.is_empty() {
             // As above.
             let _ = host.write(Output::Error, &self.errors);
@@ -164,22 +164,22 @@ impl Console {
     }
 
     /// Returns the number of characters since the last line end of a stream.
-    pub(crate) fn column(&self, output: Output) -> usize {
+    pub fn column(&self, output: Output) -> usize {
         self.columns[output as usize]
     }
 
     /// Returns whether nobody reads standard output any more.
-    pub(crate) fn is_broken(&self) -> bool {
+    pub fn is_broken(&self) -> bool {
         self.broken
     }
 
     /// Returns the error of a write to standard output, if there was one since the last call.
-    pub(crate) fn take_failure(&mut self) -> Option<HostError> {
+    pub fn take_failure(&mut self) -> Option<HostError> {
         self.failure.take()
     }
 
     /// Takes the next character of standard input.
-    pub(crate) fn read(&mut self, host: &mut dyn Host) -> Taken<u32> {
+    pub fn read(&mut self, host: &mut dyn Host) -> Taken<u32> {
         loop {
             if let Some(character) = self.input.pop_front() {
                 return Taken::Next(character);
@@ -194,7 +194,7 @@ impl Console {
     }
 
     /// Takes the next line of standard input without its line end, and whether the line end was missing.
-    pub(crate) fn read_line(&mut self, host: &mut dyn Host) -> Taken<(Vec<u32>, bool)> {
+    pub fn read_line(&mut self, host: &mut dyn Host) -> Taken<(Vec<u32>, bool)> {
         let mut searched = 0;
         loop {
             let end = self.input.iter().skip(searched).position(|&c| c == u32::from('\n'));
@@ -215,33 +215,33 @@ impl Console {
     }
 
     /// Returns whether the input has ended.
-    pub(crate) fn is_at_end(&self) -> bool {
+    pub fn is_at_end(&self) -> bool {
         self.at_end
     }
 
     /// Returns the number of characters of the input that have arrived and were not read.
-    pub(crate) fn pending(&self) -> usize {
+    pub fn pending(&self) -> usize {
         self.input.len()
     }
 
     /// Returns the first of these characters, at most `limit`.
-    pub(crate) fn first_pending(&self, limit: usize) -> String {
+    pub fn first_pending(&self, limit: usize) -> String {
         let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
         self.input.iter().take(limit).map(text).collect()
     }
 
     /// Drops this number of characters of the input.
-    pub(crate) fn skip(&mut self, characters: usize) {
+    pub fn skip(&mut self, characters: usize) {
         self.input.drain(..characters.min(self.input.len()));
     }
 
     /// Puts a character back in front of the input.
-    pub(crate) fn unread(&mut self, character: u32) {
+    pub fn unread(&mut self, character: u32) {
         self.input.push_front(character);
     }
 
     /// Puts a line back in front of the input.
-    pub(crate) fn unread_line(&mut self, line: &[u32], is_cut: bool) {
+    pub fn unread_line(&mut self, line: &[u32], is_cut: bool) {
         if !is_cut {
             self.unread(u32::from('\n'));
         }
@@ -249,7 +249,7 @@ impl Console {
     }
 
     /// Reads more input, in addition to what was not read yet.
-    pub(crate) fn fill(&mut self, host: &mut dyn Host) -> Taken<()> {
+    pub fn fill(&mut self, host: &mut dyn Host) -> Taken<()> {
         if self.at_end {
             return Taken::End;
         }
@@ -298,7 +298,7 @@ impl Console {
 }
 
 /// Returns the column after writing `characters` from `column` on.
-pub(crate) fn column_after(column: usize, characters: &[u32]) -> usize {
+pub fn column_after(column: usize, characters: &[u32]) -> usize {
     match characters.iter().rposition(|&c| c == u32::from('\n')) {
         Some(last) => characters.len() - last - 1,
         None => column + characters.len(),
@@ -306,7 +306,7 @@ pub(crate) fn column_after(column: usize, characters: &[u32]) -> usize {
 }
 
 /// Appends characters as UTF-8; a code that is not a Unicode scalar value becomes U+FFFD.
-pub(crate) fn encode(characters: &[u32], bytes: &mut Vec<u8>) {
+pub fn encode(characters: &[u32], bytes: &mut Vec<u8>) {
     for &code in characters {
         match u8::try_from(code) {
             Ok(byte) if byte < 0x80 => bytes.push(byte),
@@ -321,7 +321,7 @@ pub(crate) fn encode(characters: &[u32], bytes: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::host::VirtualHost;
+    use crate::VirtualHost;
 
     fn codes(text: &str) -> Vec<u32> {
         text.chars().map(u32::from).collect()

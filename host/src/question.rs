@@ -46,7 +46,9 @@ impl fmt::Debug for Kept {
 }
 
 impl Kept {
-    pub(crate) fn new(number: u64, inbox: Inbox) -> Kept {
+    /// Creates the note that the machine keeps a value under this number.
+    #[doc(hidden)]
+    pub fn new(number: u64, inbox: Inbox) -> Kept {
         Kept(Arc::new(KeptNumber { number, inbox }))
     }
 
@@ -165,7 +167,8 @@ impl Asking {
 
 impl Inbox {
     /// Hands the answer to the question with this number to whoever waits for it.
-    pub(crate) fn answer(&self, number: u64, answer: Answer) {
+    #[doc(hidden)]
+    pub fn answer(&self, number: u64, answer: Answer) {
         let slot = self.asking().waiting().slots.remove(&number);
         if let Some(slot) = slot {
             slot.fill(answer);
@@ -173,7 +176,8 @@ impl Inbox {
     }
 
     /// Says that no question will be answered any more.
-    pub(crate) fn end_answers(&self) {
+    #[doc(hidden)]
+    pub fn end_answers(&self) {
         self.asking().waiting().is_closed = true;
         self.end_questions();
     }

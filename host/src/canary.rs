@@ -7,14 +7,14 @@ use esl_heap::list_state;
 
 /// Hash of a sequence of words.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Canary(u64);
+pub struct Canary(u64);
 
 list_state! { Canary { 0: Run } }
 
 impl Canary {
     /// Mixes in a word.
     #[inline(always)]
-    pub(crate) fn mix(&mut self, word: u64) {
+    pub fn mix(&mut self, word: u64) {
         // Each line is a bijection of the hash for a given word, and of the word for a given hash.
         self.0 = (self.0 ^ word).wrapping_mul(0xD6E8_FEB8_6659_FD93);
         self.0 ^= self.0 >> 32;
@@ -31,7 +31,8 @@ impl Canary {
     }
 
     /// Returns the hash.
-    pub(crate) const fn value(self) -> u64 {
+    #[inline]
+    pub const fn value(self) -> u64 {
         self.0
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::host::{RecordingHost, VirtualHost};
+use crate::{RecordingHost, VirtualHost};
 
 /// A stand-in for a program: describes what it learns from `host`.
 fn run(host: &mut dyn Host) -> String {

@@ -98,29 +98,34 @@ impl Doors {
 
 impl Inbox {
     /// Says that there is an input of this name; with a capacity, if senders wait when it is full.
-    pub(crate) fn open_door(&self, name: &str, capacity: Option<usize>) {
+    #[doc(hidden)]
+    pub fn open_door(&self, name: &str, capacity: Option<usize>) {
         self.doors().state().doors.entry(name.into()).or_default().capacity = capacity;
         self.doors().change(name, |_| {});
     }
 
     /// Says that the input is no more.
-    pub(crate) fn remove_door(&self, name: &str) {
+    #[doc(hidden)]
+    pub fn remove_door(&self, name: &str) {
         self.doors().state().doors.remove(name);
         self.doors().room.notify_all();
     }
 
     /// Says that a signal that was sent to the input has come.
-    pub(crate) fn note_arrival(&self, name: &str) {
+    #[doc(hidden)]
+    pub fn note_arrival(&self, name: &str) {
         self.doors().change(name, |door| door.sent = door.sent.saturating_sub(1));
     }
 
     /// Says how many signals the input keeps.
-    pub(crate) fn note_kept(&self, name: &str, kept: usize) {
+    #[doc(hidden)]
+    pub fn note_kept(&self, name: &str, kept: usize) {
         self.doors().change(name, |door| door.kept = kept);
     }
 
     /// Says that the machine is gone.
-    pub(crate) fn close_doors(&self) {
+    #[doc(hidden)]
+    pub fn close_doors(&self) {
         self.doors().state().is_closed = true;
         self.doors().room.notify_all();
     }

@@ -62,7 +62,7 @@ struct Shared {
 /// The part of an operation that the machine keeps: it can cancel the operation, and say that its task stands
 /// still.
 #[derive(Clone, Default)]
-pub(crate) struct Canceller(Arc<Shared>);
+pub struct Canceller(Arc<Shared>);
 
 impl fmt::Debug for Canceller {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -82,7 +82,7 @@ impl Canceller {
     }
 
     /// Tells the outside to stop the operation.
-    pub(crate) fn cancel(&self) {
+    pub fn cancel(&self) {
         let before = std::mem::replace(&mut *self.lock(), OnCancel::Done);
         if let OnCancel::Call(function) = before {
             function();
@@ -90,7 +90,7 @@ impl Canceller {
     }
 
     /// Tells the outside that the task which has begun the operation stands still, or goes on.
-    pub(crate) fn suspend(&self, is_suspended: bool) {
+    pub fn suspend(&self, is_suspended: bool) {
         let mut suspension = self.lock_suspension();
         if std::mem::replace(&mut suspension.is_suspended, is_suspended) != is_suspended
             && let Some(function) = &mut suspension.on_change
@@ -115,12 +115,8 @@ pub struct HostOperation {
 
 impl HostOperation {
     /// Begins the operation with this number, of which the inbox will hear.
-    pub(crate) fn new(
-        number: u64,
-        arguments: Vec<Datum>,
-        inbox: Inbox,
-        canceller: Canceller,
-    ) -> HostOperation {
+    #[doc(hidden)]
+    pub fn new(number: u64, arguments: Vec<Datum>, inbox: Inbox, canceller: Canceller) -> HostOperation {
         HostOperation { number, arguments, inbox, canceller, is_over: false }
     }
 

@@ -23,8 +23,7 @@ use super::{News, ProcessSignal, Wake};
 #[derive(Clone, Debug)]
 pub enum Incoming {
     /// The run is to end: every task is aborted, newest first; without a main task, only the one named by
-    /// [`Vm::set_interruptible`](crate::vm::Vm::set_interruptible). An interrupt during the end of a run cuts
-    /// that short.
+    /// `Vm::set_interruptible`. An interrupt during the end of a run cuts that short.
     Signal(ProcessSignal),
     /// The run under way, or the next one, is to come back to the embedder.
     Stop,
@@ -158,12 +157,14 @@ impl Inbox {
     }
 
     /// Notes that the program handles a signal of the process.
-    pub(crate) fn note_handled(&self, signal: ProcessSignal) {
+    #[doc(hidden)]
+    pub fn note_handled(&self, signal: ProcessSignal) {
         self.0.handled.fetch_or(1 << signal.number(), Ordering::Relaxed);
     }
 
     /// Notes that no signal of the process is handled any more.
-    pub(crate) fn note_none_handled(&self) {
+    #[doc(hidden)]
+    pub fn note_none_handled(&self) {
         self.0.handled.store(0, Ordering::Relaxed);
     }
 
@@ -190,7 +191,8 @@ impl Inbox {
     }
 
     /// Ends the ringing if nothing is there but looks, which are about to be taken.
-    pub(crate) fn quieten(&self) {
+    #[doc(hidden)]
+    pub fn quieten(&self) {
         let contents = self.contents();
         if contents.is_empty() {
             self.0.is_rung.store(false, Ordering::Relaxed);

@@ -312,12 +312,14 @@ impl Inbox {
     }
 
     /// Takes the looks.
-    pub(crate) fn take_looks(&self) -> Vec<Look> {
+    #[doc(hidden)]
+    pub fn take_looks(&self) -> Vec<Look> {
         std::mem::take(&mut self.looks().list)
     }
 
     /// Says that the machine is gone.
-    pub(crate) fn end_looks(&self) {
+    #[doc(hidden)]
+    pub fn end_looks(&self) {
         let mut looks = self.looks();
         looks.is_closed = true;
         looks.list.clear();
@@ -327,7 +329,7 @@ impl Inbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::host::{Incoming, Wake};
+    use crate::{Incoming, Wake};
 
     #[test]
     fn a_look_is_told_from_an_arrival() {
