@@ -57,14 +57,17 @@ impl Asked {
     }
 
     /// Returns the canary of the questions so far.
+    #[inline]
     pub fn canary(&self) -> Canary {
         self.canary
     }
 
+    #[inline]
     fn note(&mut self, question: AskedQuestion) {
         self.canary.mix(question as u64);
     }
 
+    #[inline]
     fn note_word(&mut self, question: AskedQuestion, word: u64) {
         self.note(question);
         self.canary.mix(word);
@@ -111,6 +114,7 @@ impl Asked {
 }
 
 impl Host for Asked {
+    #[inline]
     fn monotonic(&mut self) -> u64 {
         self.note(AskedQuestion::Monotonic);
         self.host.monotonic()
@@ -126,6 +130,7 @@ impl Host for Asked {
         self.host.processor_time()
     }
 
+    #[inline]
     fn due(&mut self, deadline: u64) -> Option<u64> {
         self.note_word(AskedQuestion::Due, deadline);
         self.host.due(deadline)
@@ -140,15 +145,18 @@ impl Host for Asked {
         wake
     }
 
+    #[inline]
     fn stopwatch(&mut self) -> u64 {
         // No question of the run's.
         self.host.stopwatch()
     }
 
+    #[inline]
     fn is_virtual(&self) -> bool {
         self.host.is_virtual()
     }
 
+    #[inline]
     fn advance(&mut self, nanoseconds: u64) {
         self.note_word(AskedQuestion::Advance, nanoseconds);
         self.host.advance(nanoseconds);
@@ -238,6 +246,7 @@ impl Host for Asked {
         self.host.inbox()
     }
 
+    #[inline]
     fn poll(&mut self, round: u64) -> Vec<Incoming> {
         self.host.poll(round)
     }
@@ -250,6 +259,7 @@ impl Host for Asked {
         self.host.hear_of_refusal();
     }
 
+    #[inline]
     fn check(&mut self, check: RunCheck) {
         // No question of the run's.
         self.host.check(check);

@@ -94,6 +94,7 @@ impl Console {
     }
 
     /// Returns whether a task may write to a stream now, and need not wait.
+    #[inline]
     pub fn has_room(&mut self, host: &mut dyn Host, output: Output) -> bool {
         let limit = if output == Output::Standard { BLOCK } else { 1 };
         if self.errors.is_empty() && self.output.len() < limit {
@@ -104,6 +105,7 @@ impl Console {
     }
 
     /// Returns whether something waits until there is room for it.
+    #[inline]
     pub fn is_behind(&self) -> bool {
         !self.errors.is_empty() || !self.output.is_empty()
     }
@@ -142,6 +144,7 @@ impl Console {
     }
 
     /// Returns the hash of everything written to standard output.
+    #[inline]
     pub fn noted(&self) -> u64 {
         self.noted.unwrap_or(0)
     }
@@ -164,11 +167,13 @@ impl Console {
     }
 
     /// Returns the number of characters since the last line end of a stream.
+    #[inline]
     pub fn column(&self, output: Output) -> usize {
         self.columns[output as usize]
     }
 
     /// Returns whether nobody reads standard output any more.
+    #[inline]
     pub fn is_broken(&self) -> bool {
         self.broken
     }
@@ -215,11 +220,13 @@ impl Console {
     }
 
     /// Returns whether the input has ended.
+    #[inline]
     pub fn is_at_end(&self) -> bool {
         self.at_end
     }
 
     /// Returns the number of characters of the input that have arrived and were not read.
+    #[inline]
     pub fn pending(&self) -> usize {
         self.input.len()
     }

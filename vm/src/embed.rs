@@ -4,6 +4,7 @@
 use std::fmt;
 
 use esl_bytecode::datum::Datum;
+use esl_database::Database;
 use esl_host::machine::Canary;
 use esl_host::{Host, Inbox, Incoming, Output, ProcessSignal};
 
@@ -11,7 +12,6 @@ use crate::builtins::NATIVES;
 use crate::compiler::Compilations;
 use crate::config::Config;
 use crate::cpu::Cpu;
-use crate::database::Database;
 use crate::datum;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;

@@ -1,4 +1,4 @@
-//! The ESL virtual machine: the interpreter, tasks and their scheduler, builtins, and the database.
+//! The ESL virtual machine: the interpreter, tasks and their scheduler, and builtins.
 
 #![deny(unsafe_code)]
 
@@ -29,7 +29,6 @@ pub const EXECUTION_EPOCH: u32 = 6;
 mod compiler;
 mod config;
 mod cpu;
-mod database;
 mod datum;
 mod describe;
 mod embedder;

@@ -14,11 +14,11 @@
 
 use std::collections::BTreeMap;
 
+use esl_database::Database;
 use esl_host::HostState;
 use esl_host::machine::{Canary, Console};
 
 use crate::config::Config;
-use crate::database::Database;
 use crate::embedder::Embedder;
 use crate::exchange::{Charges, Exchange};
 use crate::heap::HeapImage;

@@ -1,11 +1,11 @@
 //! The virtual machine: a heap, a world of names, and tasks that run in them.
 
 use esl_bytecode::builtin::BUILTINS;
+use esl_database::Database;
 
 use crate::compiler::Compilations;
 pub use crate::config::Config;
 use crate::cpu::Cpu;
-use crate::database::Database;
 use crate::describe::describe;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;

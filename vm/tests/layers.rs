@@ -22,7 +22,6 @@ const LAYERS: &[&str] = &[
     "describe",
     "raise",
     // The parts of the machine: data with their own operations.
-    "database",
     "task",
     "wait",
     "outside",

@@ -1,7 +1,8 @@
 //! The logical database: changes of facts, and queries in steps. Whatever calls functions of the program is
 //! ESL, in `stdlib/database.esl`.
 
-use crate::database::{FormulaError, Progress, QueryError};
+use esl_database::{FormulaError, Progress, QueryError};
+
 use crate::heap::AllocError;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::report;

@@ -7,7 +7,10 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use esl_bytecode::symbol::Symbol;
-use esl_host::{FrameRow, InputRow, LockRow, RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding};
+use esl_database::RelationFigures;
+use esl_host::{
+    FrameRow, InputRow, LockRow, RelationRow, RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
+};
 
 use super::holders::{holders_of, number_of};
 use super::label::{field_of, items};
@@ -70,12 +73,13 @@ impl Vm {
             survey.frames = task.map_or(Vec::new(), |task| frames(self, task));
         }
         if request.data {
-            survey.relations = self.database.relation_rows(&self.heap);
+            let relations = self.database.relation_figures(&self.heap, describe);
+            survey.relations = relations.into_iter().map(relation_row).collect();
             survey.locks = locks(self).take(LOCKS).map(|lock| lock_row(self, lock)).collect();
             survey.inputs = inputs(self);
         }
         if let Some((relation, from)) = &request.facts {
-            survey.facts = self.database.fact_texts(&self.heap, relation, *from, FACTS);
+            survey.facts = self.database.fact_texts(&self.heap, describe, relation, *from, FACTS);
         }
         if let Some(after) = request.failures_after {
             let recent = self.watch.journal.recent.iter();
@@ -83,6 +87,12 @@ impl Vm {
         }
         survey
     }
+}
+
+/// Returns the row of a survey for a relation.
+fn relation_row(relation: RelationFigures) -> RelationRow {
+    let RelationFigures { name, width, facts, is_property } = relation;
+    RelationRow { name, width, facts, is_property }
 }
 
 /// Returns whether a task is one of the program that has not ended, and not one that answers a question from

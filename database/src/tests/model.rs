@@ -176,7 +176,7 @@ proptest! {
         }
         let before = facts.clone();
         let query = fixture.open(&first.text());
-        _ = fixture.vm.database.step(query, &mut portion.clone());
+        _ = fixture.database.step(query, &mut portion.clone());
         for (adds, fact) in meanwhile {
             change(&mut fixture, &mut facts, adds, fact);
         }

@@ -1,16 +1,17 @@
 //! Open queries: a question is asked, goes on in steps, gives its answers, and is closed.
 
+use esl_heap::Value;
+use esl_heap::heap::{AllocError, Heap, Holder};
+
 use super::query::QueryRoom;
 use super::{Database, FormulaError, Progress, Query, QueryError};
-use crate::heap::{AllocError, Heap, Holder};
-use crate::value::Value;
 
 impl Database {
     /// Begins a query (see [`Query::begin`]) and returns its number.
     ///
     /// # Errors
     /// [`FormulaError`] unless it is a query and there is room.
-    pub(crate) fn open(
+    pub fn open(
         &mut self,
         heap: &mut Heap,
         query: Value,
@@ -29,7 +30,7 @@ impl Database {
     }
 
     /// Runs a query until `work` is used up or the query needs something. `None` if it is not open.
-    pub(crate) fn step(&mut self, key: u64, work: &mut usize) -> Option<Result<Progress, QueryError>> {
+    pub fn step(&mut self, key: u64, work: &mut usize) -> Option<Result<Progress, QueryError>> {
         let mut query = self.queries.get_mut(&key)?.take()?;
         let before = query.bytes();
         let progress = query.step(self, work);
@@ -40,7 +41,8 @@ impl Database {
     }
 
     /// Gives a query the outcome of the test that it has requested.
-    pub(crate) fn tell(&mut self, key: u64, holds: bool) {
+    #[inline]
+    pub fn tell(&mut self, key: u64, holds: bool) {
         if let Some(Some(query)) = self.queries.get_mut(&key) {
             query.tell(holds);
         }
@@ -51,7 +53,7 @@ impl Database {
     ///
     /// # Errors
     /// As for every allocation; then no answer is taken.
-    pub(crate) fn answers(
+    pub fn answers(
         &mut self,
         heap: &mut Heap,
         key: u64,
@@ -89,7 +91,7 @@ impl Database {
     ///
     /// # Errors
     /// As for every allocation; then nothing is removed.
-    pub(crate) fn retract_next(
+    pub fn retract_next(
         &mut self,
         heap: &mut Heap,
         key: u64,
@@ -122,13 +124,14 @@ impl Database {
     }
 
     /// Returns whether all answers found by a query were taken.
-    pub(crate) fn has_all_given(&self, key: u64) -> bool {
+    #[inline]
+    pub fn has_all_given(&self, key: u64) -> bool {
         let query = self.queries.get(&key).and_then(Option::as_ref);
         query.is_none_or(|query| query.taken == query.tuples.len())
     }
 
     /// Closes a query.
-    pub(crate) fn close(&mut self, heap: &mut Heap, key: u64) {
+    pub fn close(&mut self, heap: &mut Heap, key: u64) {
         let Some(Some(mut query)) = self.queries.remove(&key) else { return };
         self.bytes -= query.bytes();
         self.released.push(std::mem::take(&mut query.held));

@@ -20,6 +20,8 @@
 //! Source: Gat 1997, section 5. The view of a query is the logical update view of Prolog (Lindholm and
 //! O'Keefe 1987).
 
+#![forbid(unsafe_code)]
+
 mod bucket;
 mod facts;
 mod formula;
@@ -42,18 +44,20 @@ mod tests;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
+use esl_heap::Value;
+use esl_heap::heap::{AllocError, Heap, Holder};
 use esl_heap::list_state;
 
-use crate::heap::{AllocError, Heap, Holder};
-use crate::value::Value;
 use bucket::Buckets;
-pub(crate) use formula::FormulaError;
+pub use formula::FormulaError;
 use formula::FormulaParser;
+use query::Query;
 use query::QueryRoom;
-pub(crate) use query::{Progress, Query, QueryError};
+pub use query::{Progress, QueryError};
 use relation::Relation;
 use rule::{Rule, Rules};
-pub(crate) use term::Term;
+pub use survey::{Describe, RelationFigures};
+pub use term::Term;
 use term::Terms;
 
 /// Greatest number of rows freed by one operation.
@@ -70,7 +74,7 @@ struct EndedFact {
 
 /// The facts and rules of a machine, and its open queries.
 #[derive(Debug, Default)]
-pub(crate) struct Database {
+pub struct Database {
     terms: Terms,
     relations: Vec<Relation>,
     /// Relations by functor and width.
@@ -120,7 +124,7 @@ list_state! { Database {
 
 impl Database {
     /// Returns a copy; `None` while a query is open.
-    pub(crate) fn copy(&self) -> Option<Database> {
+    pub fn copy(&self) -> Option<Database> {
         self.queries.is_empty().then(|| Database {
             terms: self.terms.clone(),
             relations: self.relations.clone(),
@@ -147,7 +151,7 @@ impl Database {
 
     /// Makes the table of objects if there is none yet; the caller keeps the returned object from being
     /// collected.
-    pub(crate) fn prepare(&mut self, heap: &mut Heap) -> Result<Option<Value>, AllocError> {
+    pub fn prepare(&mut self, heap: &mut Heap) -> Result<Option<Value>, AllocError> {
         self.terms.make_object_table(heap)
     }
 
@@ -155,7 +159,7 @@ impl Database {
     ///
     /// # Errors
     /// [`FormulaError`] unless it is a rule and there is room.
-    pub(crate) fn define_rule(
+    pub fn define_rule(
         &mut self,
         heap: &mut Heap,
         [head_text, body, source]: [Value; 3],
@@ -191,7 +195,7 @@ impl Database {
     ///
     /// # Errors
     /// [`FormulaError`] if the source is not that of a rule, or there is no room for its terms.
-    pub(crate) fn remove_rule(
+    pub fn remove_rule(
         &mut self,
         heap: &mut Heap,
         source: Value,
@@ -217,7 +221,8 @@ impl Database {
     ///
     /// # Errors
     /// As for every allocation.
-    pub(crate) fn value(&self, heap: &mut Heap, term: Term) -> Result<Value, AllocError> {
+    #[inline]
+    pub fn value(&self, heap: &mut Heap, term: Term) -> Result<Value, AllocError> {
         self.terms.value(heap, term, &mut 0)
     }
 
@@ -225,19 +230,21 @@ impl Database {
     ///
     /// # Errors
     /// As for every allocation.
-    pub(crate) fn check_room(&self, heap: &mut Heap) -> Result<(), AllocError> {
+    #[inline]
+    pub fn check_room(&self, heap: &mut Heap) -> Result<(), AllocError> {
         heap.set_external(Holder::Facts, self.footprint())
     }
 
     // ---- telling states apart
 
     /// Returns whether no query is open.
-    pub(crate) fn is_quiet(&self) -> bool {
+    #[inline]
+    pub fn is_quiet(&self) -> bool {
         self.queries.is_empty()
     }
 
     /// Calls `visit` with words and objects that determine the facts and rules, and their order.
-    pub(crate) fn visit_state(&self, visit: &mut dyn FnMut(Result<u64, Value>)) {
+    pub fn visit_state(&self, visit: &mut dyn FnMut(Result<u64, Value>)) {
         // Without `..`: a new field does not compile until it is handled here.
         let Database {
             terms,
@@ -281,7 +288,8 @@ impl Database {
     // ---- upkeep
 
     /// Returns the bytes that the database takes, approximately.
-    pub(crate) fn footprint(&self) -> usize {
+    #[inline]
+    pub fn footprint(&self) -> usize {
         self.bytes + self.terms.bytes
     }
 
@@ -335,3 +343,8 @@ impl Database {
         }
     }
 }
+
+/// The example of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -11,11 +11,11 @@
 
 use std::collections::BTreeMap;
 
+use esl_heap::Value;
+use esl_heap::heap::{AllocError, Heap};
 use smallvec::SmallVec;
 
 use super::term::{MAX_SIZE, Term, TermError, Terms};
-use crate::heap::{AllocError, Heap};
-use crate::value::Value;
 
 /// Greatest depth of formulas within formulas.
 const MOST_NESTED: usize = 100;
@@ -24,7 +24,7 @@ const MOST_PARTS: usize = 1 << 13;
 
 /// Why a query or a fact was refused.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum FormulaError {
+pub enum FormulaError {
     /// There is no room.
     Room(AllocError),
     /// The fact has variables.

@@ -2,24 +2,60 @@
 
 mod model;
 
-use esl_bytecode::symbol::Symbol;
+use std::collections::BTreeMap;
 
-use super::{Progress, Term};
-use crate::value::Value;
-use crate::vm::Vm;
+use esl_heap::{Heap, Value};
 
-/// A machine, with texts in place of values.
+use super::{Database, Progress, Term};
+
+/// A database and a heap, which is never collected, with texts in place of values.
 struct Fixture {
-    vm: Vm,
+    heap: Heap,
+    database: Database,
+    symbols: BTreeMap<String, Value>,
+}
+
+/// Returns the text of a value, which consists of pairs, symbols, numbers and strings.
+fn describe(heap: &Heap, value: Value) -> String {
+    if let Some(number) = value.as_fixnum() {
+        return number.to_string();
+    }
+    if let Some(symbol) = heap.symbol(value) {
+        return heap.string_text(symbol.name).unwrap();
+    }
+    if let Some(number) = heap.as_double(value) {
+        return format!("{number:?}");
+    }
+    if let Some(text) = heap.string_text(value) {
+        return format!("{text:?}");
+    }
+    if value.is_nil() {
+        return "NIL".into();
+    }
+    assert!(value.is_cons(), "values in facts of these tests");
+    let mut parts = Vec::new();
+    let mut rest = value;
+    while let Some(pair) = heap.as_cons(rest) {
+        parts.push(describe(heap, pair.car));
+        rest = pair.cdr;
+    }
+    if rest.is_true() {
+        parts.extend([".".into(), describe(heap, rest)]);
+    }
+    format!("({})", parts.join(" "))
 }
 
 impl Fixture {
     fn new() -> Fixture {
-        let mut vm = Vm::for_tests();
-        if let Some(objects) = vm.database.prepare(&mut vm.heap).unwrap() {
-            vm.pin(objects);
-        }
-        Fixture { vm }
+        let mut heap = esl_heap_testing::heap();
+        let mut database = Database::default();
+        database.prepare(&mut heap).unwrap();
+        Fixture { heap, database, symbols: BTreeMap::new() }
+    }
+
+    fn symbol(&mut self, name: String) -> Value {
+        let make = || esl_heap_testing::symbol(&mut self.heap, &name).unwrap();
+        *self.symbols.entry(name.clone()).or_insert_with(make)
     }
 
     fn read(&mut self, text: &str) -> Value {
@@ -36,20 +72,15 @@ impl Fixture {
                     let dot = items.iter().position(|&item| item == Value::EOF);
                     let tail = dot.map_or(Value::NIL, |at| items[at + 1]);
                     items.truncate(dot.unwrap_or(items.len()));
-                    self.vm.heap.list_with_tail(&items, tail).unwrap()
+                    self.heap.list_with_tail(&items, tail).unwrap()
                 }
                 "." => Value::EOF,
                 "nil" => Value::NIL,
                 word => match word.parse::<f64>() {
-                    Ok(x) if word.contains('.') => self.vm.heap.float(x).unwrap(),
+                    Ok(x) if word.contains('.') => self.heap.float(x).unwrap(),
                     Ok(x) => Value::fixnum(x as i64).unwrap(),
-                    Err(_) if word.starts_with('"') => {
-                        self.vm.heap.alloc_str(word.trim_matches('"')).unwrap()
-                    }
-                    Err(_) => {
-                        let symbol = Symbol::esl(&word.to_uppercase());
-                        self.vm.world.intern(&mut self.vm.heap, &symbol).unwrap()
-                    }
+                    Err(_) if word.starts_with('"') => self.heap.alloc_str(word.trim_matches('"')).unwrap(),
+                    Err(_) => self.symbol(word.to_uppercase()),
                 },
             };
             lists.last_mut().unwrap().push(item);
@@ -59,51 +90,51 @@ impl Fixture {
 
     fn assert(&mut self, text: &str) -> bool {
         let fact = self.read(text);
-        self.vm.database.assert(&mut self.vm.heap, fact, &mut 0).unwrap().is_true()
+        self.database.assert(&mut self.heap, fact, &mut 0).unwrap().is_true()
     }
 
     fn retract(&mut self, text: &str) -> bool {
         let fact = self.read(text);
-        self.vm.database.retract(&mut self.vm.heap, fact, &mut 0).unwrap()
+        self.database.retract(&mut self.heap, fact, &mut 0).unwrap()
     }
 
     fn rule(&mut self, head: &str, body: &str) {
         let parts = [self.read(head), self.read(body), self.read(&format!("({head} {body})"))];
-        self.vm.database.define_rule(&mut self.vm.heap, parts, &mut 0).unwrap();
+        self.database.define_rule(&mut self.heap, parts, &mut 0).unwrap();
     }
 
     fn open(&mut self, text: &str) -> u64 {
         let query = self.read(text);
-        self.vm.database.open(&mut self.vm.heap, query, Value::NIL, false, &mut 0).unwrap()
+        self.database.open(&mut self.heap, query, Value::NIL, false, &mut 0).unwrap()
     }
 
     /// Finds all answers in steps of `portion`; a test holds if the sum of its variables is even.
     fn finish(&mut self, query: u64, portion: usize) -> Vec<String> {
         loop {
             let mut work = portion;
-            match self.vm.database.step(query, &mut work).unwrap() {
+            match self.database.step(query, &mut work).unwrap() {
                 Ok(Progress::More) => {}
                 Ok(Progress::Done) => break,
                 Ok(Progress::Test(_, bindings)) => {
                     let sum: i64 = bindings.iter().filter_map(|(_, Term(value))| value.as_fixnum()).sum();
-                    self.vm.database.tell(query, sum % 2 == 0);
+                    self.database.tell(query, sum % 2 == 0);
                 }
                 Err(error) => return vec![format!("{error:?}").split('(').next().unwrap().to_owned()],
             }
         }
         let mut all = Vec::new();
         loop {
-            let heap = &mut self.vm.heap;
-            let mut list = self.vm.database.answers(heap, query, &mut 0).unwrap().unwrap();
+            let heap = &mut self.heap;
+            let mut list = self.database.answers(heap, query, &mut 0).unwrap().unwrap();
             if list.is_nil() {
                 break;
             }
-            while let Some(pair) = self.vm.heap.as_cons(list) {
-                all.push(self.vm.describe(pair.car));
+            while let Some(pair) = self.heap.as_cons(list) {
+                all.push(describe(&self.heap, pair.car));
                 list = pair.cdr;
             }
         }
-        self.vm.database.close(&mut self.vm.heap, query);
+        self.database.close(&mut self.heap, query);
         all
     }
 
@@ -114,19 +145,19 @@ impl Fixture {
 
     fn retract_all(&mut self, text: &str) -> Vec<String> {
         let pattern = self.read(text);
-        let heap = &mut self.vm.heap;
-        let query = self.vm.database.open(heap, pattern, Value::NIL, true, &mut 0).unwrap();
-        while self.vm.database.step(query, &mut 7) != Some(Ok(Progress::Done)) {}
+        let heap = &mut self.heap;
+        let query = self.database.open(heap, pattern, Value::NIL, true, &mut 0).unwrap();
+        while self.database.step(query, &mut 7) != Some(Ok(Progress::Done)) {}
         let mut all = Vec::new();
         loop {
-            let heap = &mut self.vm.heap;
-            let fact = self.vm.database.retract_next(heap, query, &mut 0).unwrap().unwrap();
+            let heap = &mut self.heap;
+            let fact = self.database.retract_next(heap, query, &mut 0).unwrap().unwrap();
             if fact.is_nil() {
                 break;
             }
-            all.push(self.vm.describe(fact));
+            all.push(describe(&self.heap, fact));
         }
-        self.vm.database.close(&mut self.vm.heap, query);
+        self.database.close(&mut self.heap, query);
         all
     }
 }
@@ -228,7 +259,7 @@ fn a_query_sees_what_was_there_when_it_began() {
         fixture.assert(&format!("(n {x})"));
     }
     let query = fixture.open("(and (n ?x) (n ?x))");
-    _ = fixture.vm.database.step(query, &mut 5);
+    _ = fixture.database.step(query, &mut 5);
     for x in 0..20 {
         fixture.retract(&format!("(n {x})"));
         fixture.assert(&format!("(n {})", x + 100));
@@ -252,8 +283,8 @@ fn what_has_ended_is_given_back() {
         }
     }
     fixture.query("(state ?a ?b)");
-    assert!(fixture.vm.database.terms.kept() < 20, "{}", fixture.vm.database.terms.kept());
-    assert!(fixture.vm.database.footprint() < 4000, "{}", fixture.vm.database.footprint());
+    assert!(fixture.database.terms.kept() < 20, "{}", fixture.database.terms.kept());
+    assert!(fixture.database.footprint() < 4000, "{}", fixture.database.footprint());
 }
 
 #[test]
@@ -274,17 +305,17 @@ fn properties_have_one_value() {
     for fact in ["(power camera 0)", "(power heater 0)", "(power)"] {
         fixture.assert(fact);
     }
-    assert!(fixture.vm.database.define_property(&mut fixture.vm.heap, name, 2, &mut 0).unwrap());
+    assert!(fixture.database.define_property(&mut fixture.heap, name, 2, &mut 0).unwrap());
     for value in 0..50 {
         assert_eq!(fixture.assert(&format!("(power camera {value})")), value > 0);
         assert_eq!(fixture.query("(power camera ?x)"), [format!("((?X . {value}))")]);
     }
     assert_eq!(fixture.query("(power heater ?x)"), ["((?X . 0))"]);
     let of_camera = fixture.read("(power camera)");
-    let value = fixture.vm.database.property_value(&mut fixture.vm.heap, of_camera, &mut 0).unwrap();
+    let value = fixture.database.property_value(&mut fixture.heap, of_camera, &mut 0).unwrap();
     assert_eq!(value, Value::small(49));
     fixture.retract("(power camera 49)");
-    let value = fixture.vm.database.property_value(&mut fixture.vm.heap, of_camera, &mut 0).unwrap();
+    let value = fixture.database.property_value(&mut fixture.heap, of_camera, &mut 0).unwrap();
     assert_eq!(value, Value::UNBOUND);
 }
 

@@ -12,16 +12,17 @@
 mod convert;
 mod pattern;
 
+use esl_heap::Value;
+use esl_heap::heap::{AllocError, Heap};
+
 use super::bucket::{Buckets, finish, mix};
-use crate::heap::{AllocError, Heap};
-use crate::value::Value;
 
 /// Greatest number of pairs in a term.
 pub(crate) const MAX_SIZE: u32 = 1 << 16;
 
 /// A term, or in patterns a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Term(pub(super) Value);
+pub struct Term(pub(super) Value);
 
 impl Term {
     /// Marker of a missing term.

@@ -8,7 +8,7 @@ impl Terms {
     ///
     /// # Errors
     /// [`TermError::TooLarge`].
-    pub(in crate::database) fn instantiate(
+    pub(crate) fn instantiate(
         &mut self,
         pattern: Term,
         bindings: &[Term],
@@ -29,7 +29,7 @@ impl Terms {
 
     /// Returns a pattern with its variables replaced by `replace`; `None` if that returns `None` for one of
     /// them.
-    pub(in crate::database) fn rebuild(
+    pub(crate) fn rebuild(
         &mut self,
         pattern: Term,
         made: &mut Vec<Term>,
@@ -70,7 +70,7 @@ impl Terms {
     }
 
     /// Matches a pattern with a ground term: binds variables in `bindings`, and appends them to `trail`.
-    pub(in crate::database) fn matches(
+    pub(crate) fn matches(
         &self,
         pattern: Term,
         term: Term,
@@ -115,7 +115,7 @@ impl Terms {
     }
 
     /// Calls `visit` with the number of each variable in a pattern, in textual order.
-    pub(in crate::database) fn variables(&self, pattern: Term, visit: &mut dyn FnMut(usize)) {
+    pub(crate) fn variables(&self, pattern: Term, visit: &mut dyn FnMut(usize)) {
         if let Some(variable) = pattern.as_variable() {
             return visit(variable);
         }

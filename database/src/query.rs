@@ -13,6 +13,8 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::sync::Arc;
 
+use esl_heap::Value;
+use esl_heap::heap::Heap;
 use smallvec::SmallVec;
 
 use super::Database;
@@ -22,8 +24,6 @@ use super::rule::{Rule, Rules};
 use super::solver::{Choice, MatchOperation, SolverState};
 use super::term::{Term, TermError};
 use super::tuple::Tuples;
-use crate::heap::Heap;
-use crate::value::Value;
 
 /// Destination of answers.
 #[derive(Clone, Debug)]
@@ -114,7 +114,7 @@ impl Ord for RankedAnswer {
 
 /// The outcome of a step.
 #[derive(Debug, PartialEq)]
-pub(crate) enum Progress {
+pub enum Progress {
     /// There is more to do.
     More,
     /// The query requests the outcome of a test: its function, and the variables with their values.
@@ -125,7 +125,7 @@ pub(crate) enum Progress {
 
 /// Why a query failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum QueryError {
+pub enum QueryError {
     /// A rule with this functor depends on its own negation.
     Circular(Term),
     /// A rule with this functor leaves a variable of its head without a value.

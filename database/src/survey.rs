@@ -1,29 +1,44 @@
 //! Surveys of the database: relations, and facts as texts.
 
-use esl_host::RelationRow;
+use esl_heap::{Heap, Value};
 
 use super::{Database, Term};
-use crate::describe::describe;
-use crate::heap::Heap;
 
 /// Most characters of the text of a fact.
 const CHARACTERS: usize = 500;
 /// Most relations that are told of.
 const RELATIONS: usize = 2000;
 
+/// A function that returns the text of an object, which terms are shown with.
+pub type Describe = fn(&Heap, Value) -> String;
+
+/// A relation, as it is seen from outside.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RelationFigures {
+    /// Name of the relation.
+    pub name: String,
+    /// Number of the arguments of its facts.
+    pub width: usize,
+    /// Number of its facts.
+    pub facts: usize,
+    /// Whether it is a property, with one value for the other arguments.
+    pub is_property: bool,
+}
+
 impl Database {
     /// Returns the number of facts.
-    pub(crate) fn fact_count(&self) -> usize {
+    #[inline]
+    pub fn fact_count(&self) -> usize {
         self.facts()
     }
 
     /// Returns the relations that have facts, and the properties, by name.
-    pub(crate) fn relation_rows(&self, heap: &Heap) -> Vec<RelationRow> {
+    pub fn relation_figures(&self, heap: &Heap, describe: Describe) -> Vec<RelationFigures> {
         let relations = self.relations.iter().filter(|one| one.count() > 0 || one.is_property());
-        let mut rows: Vec<RelationRow> = relations
+        let mut rows: Vec<RelationFigures> = relations
             .take(RELATIONS)
-            .map(|relation| RelationRow {
-                name: self.name(heap, relation.functor),
+            .map(|relation| RelationFigures {
+                name: name_of(heap, describe, relation.functor),
                 width: relation.width,
                 facts: relation.count(),
                 is_property: relation.is_property(),
@@ -35,11 +50,19 @@ impl Database {
 
     /// Returns the texts of facts, those of relations with this name, or of all if it is empty: at most so
     /// many, after the first `from`.
-    pub(crate) fn fact_texts(&self, heap: &Heap, name: &str, from: usize, most: usize) -> Vec<String> {
+    pub fn fact_texts(
+        &self,
+        heap: &Heap,
+        describe: Describe,
+        name: &str,
+        from: usize,
+        most: usize,
+    ) -> Vec<String> {
         let mut left = from;
         let mut texts = Vec::new();
         for relation in &self.relations {
-            if relation.count() == 0 || !name.is_empty() && self.name(heap, relation.functor) != name {
+            if relation.count() == 0 || !name.is_empty() && name_of(heap, describe, relation.functor) != name
+            {
                 continue;
             }
             if left >= relation.count() {
@@ -50,10 +73,10 @@ impl Database {
                 if texts.len() == most {
                     return texts;
                 }
-                let mut text = format!("({}", self.name(heap, relation.functor));
+                let mut text = format!("({}", name_of(heap, describe, relation.functor));
                 for &term in relation.row(row) {
                     text.push(' ');
-                    self.terms.write(heap, term, CHARACTERS, &mut text);
+                    self.terms.write(heap, describe, term, CHARACTERS, &mut text);
                 }
                 text.push(')');
                 texts.push(text);
@@ -61,8 +84,8 @@ impl Database {
         }
         texts
     }
+}
 
-    fn name(&self, heap: &Heap, functor: Term) -> String {
-        functor.as_atom().map_or("?".into(), |value| describe(heap, value))
-    }
+fn name_of(heap: &Heap, describe: Describe, functor: Term) -> String {
+    functor.as_atom().map_or("?".into(), |value| describe(heap, value))
 }

@@ -1,10 +1,11 @@
 //! Facts and properties: added, looked up and ended.
 
+use esl_heap::Value;
+use esl_heap::heap::{AllocError, Heap, Holder};
+
 use super::bucket::{finish, mix};
 use super::formula;
 use super::{Database, EndedFact, FormulaError, Relation, Term};
-use crate::heap::{AllocError, Heap, Holder};
-use crate::value::Value;
 
 impl Database {
     pub(super) fn find_relation(&self, functor: Term, width: usize) -> Option<u32> {
@@ -32,12 +33,7 @@ impl Database {
     ///
     /// # Errors
     /// [`FormulaError`] unless it is a fact and there is room; then nothing has changed.
-    pub(crate) fn assert(
-        &mut self,
-        heap: &mut Heap,
-        fact: Value,
-        work: &mut usize,
-    ) -> Result<Value, FormulaError> {
+    pub fn assert(&mut self, heap: &mut Heap, fact: Value, work: &mut usize) -> Result<Value, FormulaError> {
         self.tidy(heap);
         heap.set_external(Holder::Facts, self.footprint())?;
         let mut cells = std::mem::take(&mut self.cells);
@@ -101,7 +97,7 @@ impl Database {
     ///
     /// # Errors
     /// As for every allocation.
-    pub(crate) fn define_property(
+    pub fn define_property(
         &mut self,
         heap: &mut Heap,
         name: Value,
@@ -122,12 +118,7 @@ impl Database {
     ///
     /// # Errors
     /// As for every allocation.
-    pub(crate) fn drop_property(
-        &mut self,
-        heap: &mut Heap,
-        name: Value,
-        width: usize,
-    ) -> Result<(), AllocError> {
+    pub fn drop_property(&mut self, heap: &mut Heap, name: Value, width: usize) -> Result<(), AllocError> {
         let functor = self.terms.atom(heap, name)?;
         if let Some(number) = self.find_relation(functor, width) {
             self.relations[number as usize].drop_property();
@@ -140,7 +131,7 @@ impl Database {
     ///
     /// # Errors
     /// As for [`Database::assert`].
-    pub(crate) fn property_value(
+    pub fn property_value(
         &mut self,
         heap: &mut Heap,
         arguments: Value,
@@ -173,12 +164,7 @@ impl Database {
     ///
     /// # Errors
     /// As for [`Database::assert`].
-    pub(crate) fn retract(
-        &mut self,
-        heap: &mut Heap,
-        fact: Value,
-        work: &mut usize,
-    ) -> Result<bool, FormulaError> {
+    pub fn retract(&mut self, heap: &mut Heap, fact: Value, work: &mut usize) -> Result<bool, FormulaError> {
         self.tidy(heap);
         let mut cells = std::mem::take(&mut self.cells);
         cells.clear();

@@ -1,13 +1,14 @@
 //! From values to terms and back, and what a term looks like.
 
+use esl_heap::Value;
+use esl_heap::equality::{self, KeyTest};
+use esl_heap::heap::layout::StructureObject;
+use esl_heap::heap::{AllocError, Heap, Kind};
+use esl_heap::table::{KeyComparison, Table};
+
+use super::super::Describe;
 use super::super::bucket::{finish, mix};
 use super::{Term, TermData, Terms};
-use crate::describe::describe;
-use crate::equality::{self, KeyTest};
-use crate::heap::layout::StructureObject;
-use crate::heap::{AllocError, Heap, Kind};
-use crate::table::{KeyComparison, Table};
-use crate::value::Value;
 
 impl Terms {
     /// Returns whether an object is a symbol with a package, which is permanent.
@@ -35,10 +36,7 @@ impl Terms {
 
     /// Makes the table of objects if there is none yet; the caller keeps the returned object from being
     /// collected. Without the table, objects cannot become terms.
-    pub(in crate::database) fn make_object_table(
-        &mut self,
-        heap: &mut Heap,
-    ) -> Result<Option<Value>, AllocError> {
+    pub(crate) fn make_object_table(&mut self, heap: &mut Heap) -> Result<Option<Value>, AllocError> {
         if self.objects.is_true() {
             return Ok(None);
         }
@@ -51,12 +49,7 @@ impl Terms {
     ///
     /// # Errors
     /// As for every allocation; the slots are released all the same.
-    pub(in crate::database) fn record(
-        &mut self,
-        heap: &mut Heap,
-        class: Value,
-        slots: Term,
-    ) -> Result<Term, AllocError> {
+    pub(crate) fn record(&mut self, heap: &mut Heap, class: Value, slots: Term) -> Result<Term, AllocError> {
         let class = match self.object(heap, class) {
             Ok(class) => class,
             Err(error) => {
@@ -70,7 +63,7 @@ impl Terms {
 
     /// Returns the term of an object other than a pair, and other than a structure that `equal` compares by
     /// its slots.
-    pub(in crate::database) fn atom(&mut self, heap: &mut Heap, v: Value) -> Result<Term, AllocError> {
+    pub(crate) fn atom(&mut self, heap: &mut Heap, v: Value) -> Result<Term, AllocError> {
         if !v.is_address() {
             return Ok(Term(v));
         }
@@ -115,12 +108,7 @@ impl Terms {
     ///
     /// # Errors
     /// As for every allocation.
-    pub(in crate::database) fn value(
-        &self,
-        heap: &mut Heap,
-        term: Term,
-        work: &mut usize,
-    ) -> Result<Value, AllocError> {
+    pub(crate) fn value(&self, heap: &mut Heap, term: Term, work: &mut usize) -> Result<Value, AllocError> {
         match term.0.as_term() {
             None => Ok(term.0),
             Some(_) => self.compound_value(heap, term, work),
@@ -195,8 +183,9 @@ impl Terms {
         }
     }
 
-    /// Writes a term as a text, of which no more is written once it has so many characters.
-    pub(in crate::database) fn write(&self, heap: &Heap, term: Term, most: usize, text: &mut String) {
+    /// Writes a term as a text, of which no more is written once it has so many characters. `describe` writes
+    /// the objects in it.
+    pub(crate) fn write(&self, heap: &Heap, describe: Describe, term: Term, most: usize, text: &mut String) {
         enum TermPiece {
             Term(Term),
             Rest(Term),
