@@ -43,12 +43,12 @@ fn names_of_rows(text: &str) -> BTreeSet<String> {
     cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).map(String::from).collect()
 }
 
-/// Returns the names of the files and folders in `folder`, without `lib.rs`.
+/// Returns the names of the files and folders in `folder`, without `lib.rs` and unit tests.
 fn modules(folder: &Path) -> BTreeSet<String> {
     let entries = fs::read_dir(folder).expect("the sources can be listed");
     let paths = entries.map(|entry| entry.expect("the sources can be listed").path());
     let names = paths.map(|path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
-    names.filter(|name| name != "lib").collect()
+    names.filter(|name| name != "lib" && name != "tests").collect()
 }
 
 #[test]

@@ -14,8 +14,8 @@ use esl_bytecode::module::Module;
 use slotmap::{Key, KeyData, SlotMap, new_key_type};
 
 use crate::datum::{DatumWalk, Unit, UnitRemains};
+use crate::names::load::ModuleLoad;
 use crate::value::Value;
-use crate::world::load::ModuleLoad;
 
 new_key_type! {
     /// Key of a job in the table.

@@ -7,8 +7,8 @@ use num_bigint::BigInt;
 
 use crate::heap::layout::{CodeObject, SymbolObject};
 use crate::heap::{Heap, Kind};
+use crate::names::class;
 use crate::value::Value;
-use crate::world::class;
 
 /// Elements of a list or vector, characters of a string, and levels that are shown.
 const LENGTH: usize = 10;

@@ -17,6 +17,7 @@ use crate::embedder::Embedder;
 use crate::exchange::Exchange;
 use crate::heap::{AllocError, HeapConfig, HeapStats, Kind};
 use crate::interp::start::make_starter;
+use crate::names::{Names, class};
 use crate::observe::Watch;
 use crate::outside::{Given, Outside};
 use crate::overhead::CollectionOverhead;
@@ -28,7 +29,6 @@ use crate::trust;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
-use crate::world::{World, class};
 
 pub use crate::datum::DatumError as ExportError;
 pub use crate::outside::{DataFunction, HostFunction, Need};
@@ -62,12 +62,12 @@ impl Vm {
         let heap_config =
             HeapConfig { limit: config.memory, images: config.snapshots, ..HeapConfig::default() };
         let mut heap = trust::new_heap(heap_config);
-        let world = World::new(&mut heap)?;
+        let names = Names::new(&mut heap)?;
         let starter = make_starter(&mut heap)?;
         let any_event = event::make(&mut heap, Value::NIL)?;
         Ok(Vm {
             heap,
-            world,
+            names,
             compiler: Compilations::default(),
             database: Database::default(),
             scheduler: Scheduler::new(config.seed, Clock::of(&*host), starter, any_event),
@@ -198,7 +198,7 @@ impl Vm {
     /// # Errors
     /// [`ExportError`] if the value is circular, or too large.
     pub fn export(&mut self, value: Value) -> Result<Datum, ExportError> {
-        let (datum, work) = datum::export(&self.heap, &self.world, value)?;
+        let (datum, work) = datum::export(&self.heap, &self.names, value)?;
         self.exchange.charge(work);
         Ok(datum)
     }
@@ -208,7 +208,7 @@ impl Vm {
     /// # Errors
     /// [`Exit::Collect`] without room.
     pub fn import(&mut self, datum: &Datum) -> Result<Value, Exit> {
-        let (value, work) = datum::import(&mut self.heap, &mut self.world, datum)?;
+        let (value, work) = datum::import(&mut self.heap, &mut self.names, datum)?;
         self.exchange.charge(work);
         Ok(value)
     }
@@ -220,8 +220,8 @@ impl Vm {
     /// # Errors
     /// [`LibraryError`] if the library has none, or there is no memory for its name.
     pub fn library_function(&mut self, name: &str) -> Result<Value, LibraryError> {
-        let symbol = self.world.intern_esl(&mut self.heap, name).map_err(|_| LibraryError::NoMemory)?;
-        if self.world.is_defined(&self.heap, symbol) {
+        let symbol = self.names.intern_esl(&mut self.heap, name).map_err(|_| LibraryError::NoMemory)?;
+        if self.names.is_defined(&self.heap, symbol) {
             Ok(symbol)
         } else {
             Err(LibraryError::Missing(name.into()))
@@ -277,7 +277,7 @@ impl Vm {
 
     /// Returns whether a condition that ended a task says that the memory is exhausted.
     pub fn is_heap_exhausted(&self, condition: Value) -> bool {
-        if condition == self.world.known.heap_exhausted {
+        if condition == self.names.known.heap_exhausted {
             return true;
         }
         let class = self.heap.structure_class(condition);

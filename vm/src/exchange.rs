@@ -6,12 +6,12 @@
 
 use crate::heap::Heap;
 use crate::lookup::{Lookup, Lookups, STEPS_FOR_NOTHING};
+use crate::names::load::LoadError;
 use crate::overhead::CollectionOverhead;
 use crate::raise::{Arguments, Exit, Expected, Raised};
 use crate::saved_pc::SavedPc;
 use crate::table::Table;
 use crate::value::Value;
-use crate::world::load::LoadError;
 
 /// Elements, or steps of a search, that are charged as one tick.
 const ELEMENTS: usize = 16;

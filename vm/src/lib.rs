@@ -17,8 +17,8 @@ pub mod schedule;
 pub mod task;
 pub mod vm;
 
+pub use names::load;
 pub use snapshot::Snapshot;
-pub use world::load;
 
 /// Number of the machine's behaviour, as far as a run can tell: what work costs how many ticks, when slices
 /// end, when the collector runs, in which order tasks have their turns. A change of any of that is a new
@@ -37,6 +37,7 @@ mod exchange;
 mod fused;
 mod interp;
 mod lookup;
+mod names;
 mod number;
 mod outside;
 mod overhead;
@@ -48,7 +49,6 @@ mod tier;
 mod trust;
 mod types;
 mod wait;
-mod world;
 
 /// The example of the README, compiled and run.
 #[cfg(doctest)]

@@ -9,9 +9,9 @@ use esl_host::Right;
 use smallvec::{SmallVec, smallvec};
 
 use crate::heap::{AllocError, Heap};
+use crate::names::Names;
+use crate::names::load::LoadError;
 use crate::value::Value;
-use crate::world::World;
-use crate::world::load::LoadError;
 
 /// Arguments of a call.
 pub(crate) type Arguments = SmallVec<[Value; 16]>;
@@ -117,23 +117,23 @@ impl From<AllocError> for Exit {
 
 impl Expected {
     /// Returns the type specifier.
-    fn specifier(self, heap: &mut Heap, world: &mut World) -> Result<Value, AllocError> {
+    fn specifier(self, heap: &mut Heap, names: &mut Names) -> Result<Value, AllocError> {
         match self {
-            Expected::Type(name) => world.intern_cl(heap, name),
+            Expected::Type(name) => names.intern_cl(heap, name),
             Expected::Index(limit) => {
                 // (INTEGER 0 (limit))
                 let limit = heap.list(&[Value::index(limit)])?;
-                let integer = world.intern_cl(heap, "INTEGER")?;
+                let integer = names.intern_cl(heap, "INTEGER")?;
                 heap.list(&[integer, Value::small(0), limit])
             }
             Expected::Specifier(specifier) => Ok(specifier),
-            Expected::Written(text) => read_specifier(heap, world, text),
+            Expected::Written(text) => read_specifier(heap, names, text),
         }
     }
 }
 
 /// Returns the type specifier that `text` writes with parentheses, names of `COMMON-LISP` and integers.
-fn read_specifier(heap: &mut Heap, world: &mut World, text: &str) -> Result<Value, AllocError> {
+fn read_specifier(heap: &mut Heap, names: &mut Names, text: &str) -> Result<Value, AllocError> {
     let spaced = text.replace('(', " ( ").replace(')', " ) ");
     let mut lists: Vec<Vec<Value>> = vec![Vec::new()];
     for word in spaced.split_whitespace() {
@@ -148,7 +148,7 @@ fn read_specifier(heap: &mut Heap, world: &mut World, text: &str) -> Result<Valu
             }
             word => match word.parse().ok().and_then(Value::fixnum) {
                 Some(n) => n,
-                None => world.intern_cl(heap, word)?,
+                None => names.intern_cl(heap, word)?,
             },
         };
         match lists.last_mut() {
@@ -164,30 +164,30 @@ impl Raised {
     ///
     /// # Errors
     /// As for every allocation.
-    pub(crate) fn arguments(&self, heap: &mut Heap, world: &mut World) -> Result<Arguments, AllocError> {
+    pub(crate) fn arguments(&self, heap: &mut Heap, names: &mut Names) -> Result<Arguments, AllocError> {
         let (keyword, rest): (&str, Arguments) = match self {
             Raised::Type(datum, expected) => {
-                ("TYPE-ERROR", smallvec![*datum, expected.specifier(heap, world)?])
+                ("TYPE-ERROR", smallvec![*datum, expected.specifier(heap, names)?])
             }
             Raised::Variable(symbol, datum, expected) => {
-                ("VARIABLE-TYPE-ERROR", smallvec![*symbol, *datum, expected.specifier(heap, world)?])
+                ("VARIABLE-TYPE-ERROR", smallvec![*symbol, *datum, expected.specifier(heap, names)?])
             }
             Raised::Bounds(start, end, length) => {
                 let least = start.as_index().unwrap_or(0);
                 let specifier = format!("(CONS (INTEGER 0 {length}) (INTEGER {least} {length}))");
                 let bounds = heap.cons(*start, *end)?;
-                ("TYPE-ERROR", smallvec![bounds, read_specifier(heap, world, &specifier)?])
+                ("TYPE-ERROR", smallvec![bounds, read_specifier(heap, names, &specifier)?])
             }
             Raised::DivisionByZero(operation, operands) => {
-                let operation = world.intern_cl(heap, operation)?;
+                let operation = names.intern_cl(heap, operation)?;
                 ("DIVISION-BY-ZERO", smallvec![operation, heap.list(operands)?])
             }
             Raised::Arithmetic(operation, text) => {
-                let operation = world.intern_cl(heap, operation)?;
+                let operation = names.intern_cl(heap, operation)?;
                 ("ARITHMETIC-ERROR", smallvec![operation, heap.alloc_str(text)?])
             }
             Raised::FloatOverflow(operation) => {
-                ("FLOATING-POINT-OVERFLOW", smallvec![world.intern_cl(heap, operation)?])
+                ("FLOATING-POINT-OVERFLOW", smallvec![names.intern_cl(heap, operation)?])
             }
             Raised::UnboundVariable(symbol) => ("UNBOUND-VARIABLE", smallvec![*symbol]),
             Raised::UndefinedFunction(symbol) => ("UNDEFINED-FUNCTION", smallvec![*symbol]),
@@ -204,9 +204,9 @@ impl Raised {
             Raised::Package(name, text) => {
                 ("PACKAGE-ERROR", smallvec![heap.alloc_str(name)?, heap.alloc_str(text)?])
             }
-            Raised::Cause(cause, argument) => ("CAUSE", smallvec![world.keyword(heap, cause)?, *argument]),
+            Raised::Cause(cause, argument) => ("CAUSE", smallvec![names.keyword(heap, cause)?, *argument]),
             Raised::Denied(right, object, flag) => {
-                let right = world.keyword(heap, &right.name().to_uppercase())?;
+                let right = names.keyword(heap, &right.name().to_uppercase())?;
                 let object = heap.alloc_str(object)?;
                 let flag = match flag {
                     Some(flag) => heap.alloc_str(flag)?,
@@ -218,7 +218,7 @@ impl Raised {
             Raised::StackExhausted => ("STACK-EXHAUSTED", smallvec![]),
             Raised::HeapExhausted => ("HEAP-EXHAUSTED", smallvec![]),
         };
-        let mut arguments: Arguments = smallvec![world.keyword(heap, keyword)?];
+        let mut arguments: Arguments = smallvec![names.keyword(heap, keyword)?];
         arguments.extend(rest);
         Ok(arguments)
     }

@@ -23,6 +23,7 @@ use crate::embedder::Embedder;
 use crate::exchange::{Charges, Exchange};
 use crate::heap::HeapImage;
 use crate::lookup::Lookups;
+use crate::names::Names;
 use crate::outside::{ExpectedOperators, Operations, Outside};
 use crate::overhead::CollectionOverhead;
 use crate::saved_pc::SavedPc;
@@ -30,12 +31,11 @@ use crate::schedule::Scheduler;
 use crate::trust;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::World;
 
 /// State of a machine between two turns.
 pub struct Snapshot {
     heap: HeapImage,
-    world: World,
+    names: Names,
     /// Number of compilations begun until then.
     compilations: u64,
     database: Database,
@@ -88,7 +88,7 @@ impl Vm {
     pub fn save(&mut self, base: Option<&Snapshot>) -> Option<Snapshot> {
         let Vm {
             heap,
-            world,
+            names,
             compiler,
             database,
             scheduler,
@@ -131,7 +131,7 @@ impl Vm {
         let host = host.save_all()?;
         Some(Snapshot {
             heap: heap.save(base.map(|base| &base.heap))?,
-            world: world.clone(),
+            names: names.clone(),
             compilations: compiler.begun,
             database,
             scheduler: scheduler.clone(),
@@ -163,7 +163,7 @@ impl Vm {
     /// Values that the machine has handed out since are of no use any more, even if they were pinned.
     #[must_use]
     pub fn restore(&mut self, snapshot: &Snapshot) -> bool {
-        let Snapshot { heap, world, compilations, database, scheduler, outside, exchange, embedder, config } =
+        let Snapshot { heap, names, compilations, database, scheduler, outside, exchange, embedder, config } =
             snapshot;
         let is_possible = self.compiler.begun == *compilations
             && self.outside.calls == outside.calls
@@ -172,7 +172,7 @@ impl Vm {
         if !trust::restore_heap(&mut self.heap, heap) {
             return false;
         }
-        self.world = world.clone();
+        self.names = names.clone();
         self.database = database;
         self.scheduler = scheduler.clone();
         // The hosts of one machine are one: it knows its states.
@@ -215,7 +215,7 @@ mod tests {
         assert!(machine(false).save(None).is_none());
         let before = one.fingerprint();
         let snapshot = one.save(None).expect("nothing is under way");
-        let name = one.world.intern_esl(&mut one.heap, "NEW").expect("there is room");
+        let name = one.names.intern_esl(&mut one.heap, "NEW").expect("there is room");
         one.heap.symbol_set_value(name, name);
         assert_ne!(one.fingerprint(), before);
         assert!(one.restore(&snapshot) && !other.restore(&snapshot));

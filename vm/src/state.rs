@@ -27,6 +27,7 @@ use esl_host::Incoming;
 use crate::compiler::Compilations;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
+use crate::names::{Names, Opaques, RootMap};
 use crate::observe::{Figures, Journal, Observers, Watch};
 use crate::outside::{Operations, Outside};
 use crate::overhead::CollectionOverhead;
@@ -35,7 +36,6 @@ use crate::task::{Control, Extra, RunningCleanup, Shortage, Task};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::Deliveries;
-use crate::world::{Opaques, RootMap, World};
 
 /// The part of a visitor of content that handles the course: the fields that describe themselves.
 pub(crate) trait VisitCourse {
@@ -81,7 +81,7 @@ macro_rules! state {
 state! {
     /// Visits the content of a machine.
     Vm by VisitVm :: machine {
-        content { scheduler, world, database, compiler, outside }
+        content { scheduler, names, database, compiler, outside }
         course { config }
         parts { heap, embedder, exchange, watch }
         transient { cpu }
@@ -135,8 +135,8 @@ state! {
 }
 
 state! {
-    /// Visits the content of a world of names.
-    World by VisitWorld :: world_content {
+    /// Visits the content of the names.
+    Names by VisitNames :: names_content {
         content { symbols }
         course {
             fresh by tell_fresh,
@@ -149,7 +149,7 @@ state! {
             opaques by tell_opaques,
         }
         transient { is_defining }
-        derived { known, names, homes, runner, streams, nil, t, rights, undefined }
+        derived { known, symbol_of, homes, runner, streams, nil, t, rights, undefined }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The promises on which interpreter and heap rely, made where safe code can see what it promises.
 //!
-//! The loader, the world and the machine make heaps, code and stubs with these functions. Each names the fact
+//! The loader, the names and the machine make heaps, code and stubs with these functions. Each names the fact
 //! that makes its unsafe step sound; the rest of the machine needs no unsafe code for any of it.
 //!
 //! Not here: the verifier (`esl_bytecode::verify`), whose theorem V1 to V14 is what [`Verified`] stands for.

@@ -1,4 +1,4 @@
-//! The virtual machine: a heap, a world of names, and tasks that run in them.
+//! The virtual machine: a heap, names, and tasks that run in them.
 
 use esl_bytecode::builtin::BUILTINS;
 use esl_database::Database;
@@ -10,6 +10,7 @@ use crate::describe::describe;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
 use crate::heap::Heap;
+use crate::names::Names;
 use crate::observe::Watch;
 use crate::outside::Outside;
 use crate::raise::Outcome;
@@ -17,7 +18,6 @@ use crate::schedule::Scheduler;
 use crate::tier::CompiledFunctions;
 pub use crate::tier::{Tier, TierReport};
 use crate::value::Value;
-use crate::world::World;
 
 /// A function that is written in Rust. The number of arguments has been checked against the table.
 pub type Native = fn(&mut Vm, &[Value]) -> Outcome;
@@ -33,7 +33,7 @@ pub struct Vm {
     /// Objects.
     pub(crate) heap: Heap,
     /// Symbols, packages, classes and loaded modules.
-    pub(crate) world: World,
+    pub(crate) names: Names,
     /// The compiler, and the compilations that programs run.
     pub(crate) compiler: Compilations,
     /// Facts and rules.

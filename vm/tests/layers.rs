@@ -17,7 +17,7 @@ const LAYERS: &[&str] = &[
     "tier",
     "trust",
     // Names and code, data from and to the compiler, words for values, failures.
-    "world",
+    "names",
     "datum",
     "describe",
     "raise",

@@ -40,7 +40,7 @@ pub(super) fn to_character(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if v.is_character() {
         return Ok(v);
     }
-    let is_designator = is_string(&vm.heap, v) || vm.world.is_symbol(&vm.heap, v);
+    let is_designator = is_string(&vm.heap, v) || vm.names.is_symbol(&vm.heap, v);
     let string = if is_designator { string_designator(vm, v)? } else { Value::NIL };
     match crate::equality::characters_of(&vm.heap, string) {
         Some(&[code]) => Ok(character_of(code)),

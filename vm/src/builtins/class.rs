@@ -5,10 +5,10 @@ use crate::builtins::define::definable;
 use crate::builtins::list::list_items;
 use crate::heap::layout::StructureObject;
 use crate::heap::{Heap, Kind};
+use crate::names::class::{self, MAX_DEPTH, class_slot, slot};
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::class::{self, MAX_DEPTH, class_slot, slot};
 
 use super::expect::exactly;
 
@@ -20,10 +20,10 @@ fn expect_class(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
     if vm.heap.is(v, Kind::Class) {
         return Ok(v);
     }
-    if let Some(class) = vm.world.find_class(v) {
+    if let Some(class) = vm.names.find_class(v) {
         return Ok(class);
     }
-    if !vm.world.is_symbol(&vm.heap, v) {
+    if !vm.names.is_symbol(&vm.heap, v) {
         return vm.exchange.type_error(v, "CLASS");
     }
     let name = vm.describe(v);
@@ -57,7 +57,7 @@ fn instance_error<T>(vm: &mut Vm, datum: Value, class: Value) -> Result<T, Exit>
 
 fn index_in(vm: &mut Vm, instance: Value, index: Value) -> Result<usize, Exit> {
     let Some(slots) = vm.heap.structure_slots(instance) else {
-        return instance_error(vm, instance, vm.world.known.structure_object);
+        return instance_error(vm, instance, vm.names.known.structure_object);
     };
     let length = slots.len();
     vm.exchange.index_below(index, length)
@@ -72,7 +72,7 @@ pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !vm.heap.is(name, Kind::Symbol) {
         return vm.exchange.type_error(name, "SYMBOL");
     }
-    if vm.world.is_locked(&vm.heap, name) {
+    if vm.names.is_locked(&vm.heap, name) {
         let name = vm.describe(name);
         return vm
             .exchange
@@ -80,7 +80,7 @@ pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     let classes = superclasses(vm, supers)?;
     let slots = list_items(vm, slots, LIMIT)?;
-    Ok(vm.world.define_class(&mut vm.heap, name, &classes, &slots, data)?)
+    Ok(vm.names.define_class(&mut vm.heap, name, &classes, &slots, data)?)
 }
 
 pub(super) fn set_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -89,12 +89,12 @@ pub(super) fn set_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if class.is_true() && !vm.heap.is(class, Kind::Class) {
         return vm.exchange.type_error(class, "CLASS");
     }
-    vm.world.set_class(&mut vm.heap, name, Some(class).filter(|class| class.is_true()));
+    vm.names.set_class(&mut vm.heap, name, Some(class).filter(|class| class.is_true()));
     Ok(name)
 }
 
 pub(super) fn find_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(vm.world.find_class(arguments[0]).unwrap_or(Value::NIL))
+    Ok(vm.names.find_class(arguments[0]).unwrap_or(Value::NIL))
 }
 
 pub(super) fn class_of(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -136,7 +136,7 @@ pub(super) fn subclass_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [class, ancestor] = exactly(arguments);
     let class = expect_class(vm, class)?;
     let ancestor = expect_class(vm, ancestor)?;
-    Ok(Value::boolean(vm.world.is_subclass(&vm.heap, class, ancestor)))
+    Ok(Value::boolean(vm.names.is_subclass(&vm.heap, class, ancestor)))
 }
 
 /// Slots without a value are `NIL`.
@@ -168,10 +168,10 @@ pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (Some(class), Some(slots)) =
         (vm.heap.structure_class(arguments[0]), vm.heap.structure_slots(arguments[0]))
     else {
-        return instance_error(vm, arguments[0], vm.world.known.structure_object);
+        return instance_error(vm, arguments[0], vm.names.known.structure_object);
     };
     if vm.heap.is_instance(arguments[0]) {
-        return instance_error(vm, arguments[0], vm.world.known.structure_object);
+        return instance_error(vm, arguments[0], vm.names.known.structure_object);
     }
     let slots = slots.to_vec();
     vm.exchange.charge(slots.len());
@@ -204,7 +204,7 @@ pub(super) fn define_accessor(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.index_below(index, usize::from(u16::MAX))?;
     let record = vm.heap.cons(index, read_only)?;
     let record = vm.heap.cons(class, record)?;
-    let indicator = vm.world.known.accessor;
+    let indicator = vm.names.known.accessor;
     super::symbol::put(vm, &[name, indicator, record])?;
     Ok(name)
 }

@@ -72,7 +72,7 @@ const MOST_SOURCES: usize = 4000;
 
 /// Returns whether a form is looked at as it was after each change, so that changes are logged.
 fn are_changes_logged(vm: &Vm) -> bool {
-    vm.heap.symbol(vm.world.known.watches).is_none_or(|symbol| symbol.value != Value::small(0))
+    vm.heap.symbol(vm.names.known.watches).is_none_or(|symbol| symbol.value != Value::small(0))
 }
 
 pub(super) fn set_fluent(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -87,7 +87,7 @@ pub(super) fn set_fluent(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Some(true) => {}
         Some(false) => {
             if !event::is_event(&vm.heap, event) {
-                return vm.exchange.not_a(event, vm.world.known.event);
+                return vm.exchange.not_a(event, vm.names.known.event);
             }
             vm.scheduler.wait_for_deliveries()?;
             run::signal(vm, event, Value::NIL)?;
@@ -225,7 +225,7 @@ fn is_empty_shelf(heap: &Heap, shelf: Value) -> bool {
 /// of it; `None` if there is no such resource, if others wait for it, or if the request has to be looked at.
 fn free_resource(vm: &mut Vm, name: Value, amount: Value, priority: Value) -> Option<(Value, Value)> {
     let plist = vm.heap.symbol(name)?.plist;
-    let resource = lookup::getf(vm, &[plist, vm.world.known.resource]).ok()?;
+    let resource = lookup::getf(vm, &[plist, vm.names.known.resource]).ok()?;
     let [.., waiters, _, _, _, capacity, used] =
         vm.heap.slots::<{ resource::USED + 1 }>(resource, Kind::SimpleVector)?;
     let (capacity, used) = (capacity.as_fixnum()?, used.as_fixnum()?);
@@ -244,7 +244,7 @@ pub(super) fn request_at_once(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     request[request::TASK] = vm.scheduler.task().object;
     request[request::SIZE] = Value::small(1);
     request[request::PRIORITY] = priority;
-    request[request::STATE] = vm.world.known.granted;
+    request[request::STATE] = vm.names.known.granted;
     request[request::OUTER] = outer;
     let request = heap.alloc_vector(&request)?;
     let first = heap.slot_or_nil(resource, resource::HOLDERS);
@@ -306,5 +306,5 @@ pub(super) fn give_back_at_once(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Ok(Value::T);
     }
     vm.scheduler.point()?;
-    Ok(Value::boolean(give_back(&mut vm.heap, request, vm.world.known.granted).is_some()))
+    Ok(Value::boolean(give_back(&mut vm.heap, request, vm.names.known.granted).is_some()))
 }

@@ -47,7 +47,7 @@ pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [fact, locks] = exactly(arguments);
     vm.scheduler.point()?;
     if has_locks(vm, locks) {
-        return Ok(vm.world.known.locked);
+        return Ok(vm.names.known.locked);
     }
     prepare(vm)?;
     let mut work = 0;
@@ -65,7 +65,7 @@ fn property(vm: &mut Vm, arguments: &[Value]) -> Result<(Value, usize), Exit> {
     let [name, width] = exactly(arguments);
     vm.scheduler.point()?;
     prepare(vm)?;
-    if !vm.world.is_symbol(&vm.heap, name) {
+    if !vm.names.is_symbol(&vm.heap, name) {
         return vm.exchange.type_error(name, "SYMBOL");
     }
     Ok((name, vm.exchange.count(width)?))
@@ -103,7 +103,7 @@ pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [fact, locks] = exactly(arguments);
     vm.scheduler.point()?;
     if has_locks(vm, locks) {
-        return Ok(vm.world.known.locked);
+        return Ok(vm.names.known.locked);
     }
     prepare(vm)?;
     let mut work = 0;
@@ -182,7 +182,7 @@ pub(super) fn query_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
                 let binding = vm.heap.cons(name, value)?;
                 vm.heap.cons(binding, list)
             });
-            let test = vm.world.known.test;
+            let test = vm.names.known.test;
             let bindings: Result<Value, AllocError> = bindings;
             vm.give_values(&[test, function, bindings?])
         }
@@ -263,7 +263,7 @@ pub(super) fn retract_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [handle, locks] = exactly(arguments);
     vm.scheduler.point()?;
     if has_locks(vm, locks) {
-        return Ok(vm.world.known.locked);
+        return Ok(vm.names.known.locked);
     }
     let key = query(vm, handle)?;
     let mut work = 0;

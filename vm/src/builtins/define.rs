@@ -17,7 +17,7 @@ pub(crate) fn set_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     vm.heap.symbol_set_function(symbol, function);
     vm.heap.symbol_set_macro_function(symbol, Value::NIL);
-    let accessor = vm.world.known.accessor;
+    let accessor = vm.names.known.accessor;
     if property(&vm.heap, symbol, accessor).is_some() {
         // It reads a slot no more; `%define-accessor` comes after the definition.
         super::symbol::remprop(vm, &[name, accessor])?;
@@ -31,7 +31,7 @@ pub(crate) fn set_macro(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !vm.heap.is(function, Kind::Function) {
         return vm.exchange.type_error(function, "FUNCTION");
     }
-    vm.world.remove_function(&mut vm.heap, name)?;
+    vm.names.remove_function(&mut vm.heap, name)?;
     vm.heap.symbol_set_macro_function(symbol, function);
     Ok(name)
 }
@@ -68,7 +68,7 @@ pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let (name, old) = (vm.describe(name), vm.describe(old));
         return vm.exchange.program_error(format!("{name} is a constant already, with the value {old}"));
     }
-    if vm.world.is_locked(&vm.heap, name) || flags & SymbolObject::SPECIAL != 0 {
+    if vm.names.is_locked(&vm.heap, name) || flags & SymbolObject::SPECIAL != 0 {
         let name = vm.describe(name);
         return vm.exchange.program_error(format!("{name} is a variable and cannot be made a constant"));
     }
@@ -82,7 +82,7 @@ pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// # Errors
 /// `type-error` if `v` is not a symbol.
 pub(crate) fn symbol_object(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
-    match vm.world.object_of(&vm.heap, v) {
+    match vm.names.object_of(&vm.heap, v) {
         Some(object) => Ok(object),
         None => vm.exchange.type_error(v, "SYMBOL"),
     }
@@ -94,7 +94,7 @@ pub(crate) fn symbol_object(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
 /// `type-error` if `v` is not a symbol, `program-error` if it belongs to the language.
 pub(crate) fn definable(vm: &mut Vm, v: Value, what: &str) -> Result<Value, Exit> {
     let object = symbol_object(vm, v)?;
-    if vm.world.is_locked(&vm.heap, v) {
+    if vm.names.is_locked(&vm.heap, v) {
         let name = vm.describe(v);
         return vm
             .exchange

@@ -39,10 +39,10 @@ use crate::compiler::{ActiveCompilation, CompilerJob, FormText, FormWalk, JobId}
 use crate::datum::{DatumError, DatumWalk, Unit};
 use crate::environment;
 use crate::heap::Holder;
+use crate::names::load::{Alone, ModuleLoad, load};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::load::{Alone, ModuleLoad, load};
 
 use super::expect::exactly;
 use super::reading::{ReadOutcome, read_datum};
@@ -89,7 +89,7 @@ fn take_job(vm: &mut Vm, handle: Value) -> Result<(JobId, CompilerJob), Exit> {
 fn go_on_with_form(vm: &mut Vm, form: &mut FormWalk) -> Result<Option<ActiveCompilation>, Exit> {
     vm.heap.check_room(0)?;
     let mut left = FORM_STEP;
-    let datum = form.walk.run(&mut form.unit, &vm.heap, &vm.world, &mut left);
+    let datum = form.walk.run(&mut form.unit, &vm.heap, &vm.names, &mut left);
     // The work of this walk is charged here, not as that of macro calls.
     _ = form.unit.take_work();
     vm.exchange.charge((FORM_STEP - left) * FORM_UNITS);
@@ -122,7 +122,7 @@ fn answer(
     }
     if let Some(walk) = &mut running.expansion {
         let mut left = FORM_STEP;
-        let walked = walk.run(unit, &vm.heap, &vm.world, &mut left);
+        let walked = walk.run(unit, &vm.heap, &vm.names, &mut left);
         vm.exchange.charge((FORM_STEP - left) * FORM_UNITS);
         let outcome = match walked {
             Ok(Some(expansion)) => StepOutcome::Expansion(expansion),
@@ -181,13 +181,13 @@ fn tell(vm: &mut Vm, compilation: &dyn Compilation, step: &Step, functions: Valu
             "DONE"
         }
     };
-    results[0] = vm.world.keyword(&mut vm.heap, kind)?;
+    results[0] = vm.names.keyword(&mut vm.heap, kind)?;
     vm.give_values(&results)
 }
 
 /// Tells the program to go on.
 fn tell_more(vm: &mut Vm) -> Outcome {
-    let more = vm.world.keyword(&mut vm.heap, "MORE")?;
+    let more = vm.names.keyword(&mut vm.heap, "MORE")?;
     vm.give_values(&[more, Value::NIL, Value::NIL, Value::NIL])
 }
 
@@ -200,8 +200,8 @@ fn list_of_diagnostics(vm: &mut Vm, compilation: &dyn Compilation, diagnostics: 
             Severity::Warning => "WARNING",
             Severity::Error => "ERROR",
         };
-        let severity = vm.world.keyword(&mut vm.heap, severity)?;
-        let code = vm.world.keyword(&mut vm.heap, &diagnostic.code.to_uppercase())?;
+        let severity = vm.names.keyword(&mut vm.heap, severity)?;
+        let code = vm.names.keyword(&mut vm.heap, &diagnostic.code.to_uppercase())?;
         let text = vm.heap.alloc_str(&text)?;
         let entry = vm.heap.list(&[severity, code, text])?;
         list = vm.heap.cons(entry, list)?;
@@ -243,7 +243,7 @@ pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let sound = sound.and_then(|module| verify(&module).map(|()| module).map_err(|error| error.to_string()));
     match sound {
         Ok(module) => {
-            let functions = load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default());
+            let functions = load(&mut vm.heap, &mut vm.names, &module, &mut Alone::default());
             vm.exchange.loaded(functions)
         }
         Err(reason) => vm.exchange.raise(Raised::File(path, format!("it is not a valid program: {reason}"))),
@@ -390,7 +390,7 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
 fn go_on_loading(vm: &mut Vm, running: &mut ActiveCompilation) -> Result<Option<Value>, Exit> {
     let Some(load) = &mut running.load else { return Ok(Some(Value::NIL)) };
     let mut work = Work::up_to(Work::STEP);
-    let functions = load.run(&mut vm.heap, &mut vm.world, &mut running.unit, &mut work);
+    let functions = load.run(&mut vm.heap, &mut vm.names, &mut running.unit, &mut work);
     vm.exchange.charge(work.done() as usize * WORK_UNITS);
     vm.exchange.loaded(functions)
 }

@@ -57,13 +57,13 @@ fn count_of_events(vm: &mut Vm, events: Value) -> Result<i64, Exit> {
         return if event::is_event(&vm.heap, events) {
             Ok(event::count(&vm.heap, events))
         } else {
-            vm.exchange.not_a(events, vm.world.known.event)
+            vm.exchange.not_a(events, vm.names.known.event)
         };
     }
     let mut sum = 0_i64;
     for event in listed_events(vm, events)? {
         if !event::is_event(&vm.heap, event) {
-            return vm.exchange.not_a(event, vm.world.known.event);
+            return vm.exchange.not_a(event, vm.names.known.event);
         }
         sum = sum.wrapping_add(event::count(&vm.heap, event));
     }
@@ -178,7 +178,7 @@ fn wait_for_room(vm: &mut Vm, event: Value) -> Result<(), Exit> {
     if !input::has_senders_wait(&vm.heap, event) {
         return Ok(());
     }
-    let what = vm.world.known.room;
+    let what = vm.names.known.room;
     let room = input::room(&vm.heap, event);
     let wait = begin_wait(vm, room, WaitOptions { what, ..WaitOptions::default() })?;
     vm.scheduler.park_at(wait, None).map(drop)
@@ -206,7 +206,7 @@ pub(super) fn make_event(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     if !event::is_event(&vm.heap, arguments[0]) {
-        return vm.exchange.not_a(arguments[0], vm.world.known.event);
+        return vm.exchange.not_a(arguments[0], vm.names.known.event);
     }
     vm.scheduler.wait_for_deliveries()?;
     if input::is_input(&vm.heap, arguments[0]) {
@@ -219,7 +219,7 @@ pub(super) fn signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn event_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
     if !event::is_event(&vm.heap, arguments[0]) {
-        return vm.exchange.not_a(arguments[0], vm.world.known.event);
+        return vm.exchange.not_a(arguments[0], vm.names.known.event);
     }
     Ok(vm.heap.slot_or_nil(arguments[0], event::COUNT))
 }
@@ -232,7 +232,7 @@ pub(super) fn count_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn event_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !event::is_event(&vm.heap, arguments[0]) {
-        return vm.exchange.not_a(arguments[0], vm.world.known.event);
+        return vm.exchange.not_a(arguments[0], vm.names.known.event);
     }
     Ok(vm.heap.slot_or_nil(arguments[0], event::NAME))
 }
@@ -260,12 +260,12 @@ pub(super) fn begin_wait(vm: &mut Vm, events: Value, options: WaitOptions) -> Ou
         return Ok(link::open(&mut vm.heap, owner, &[events], options)?);
     }
     if !events.is_list() {
-        return vm.exchange.not_a(events, vm.world.known.event);
+        return vm.exchange.not_a(events, vm.names.known.event);
     }
     let mut list = Vec::new();
     for event in listed_events(vm, events)? {
         if !event::is_event(&vm.heap, event) {
-            return vm.exchange.not_a(event, vm.world.known.event);
+            return vm.exchange.not_a(event, vm.names.known.event);
         }
         if !list.contains(&event) {
             list.push(event);
@@ -386,7 +386,7 @@ pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.wait_for_deliveries()?;
     let latest = optional(arguments, 1).as_fixnum().map(|time| time.max(0) as u64);
     match latest.or_else(|| link::deadline(&vm.heap, wait)) {
-        Some(deadline) if time_of_task(vm) >= deadline => Ok(vm.world.known.timeout),
+        Some(deadline) if time_of_task(vm) >= deadline => Ok(vm.names.known.timeout),
         deadline => {
             let deadline = deadline.map(|time| vm.scheduler.standstill().when(time));
             let parks = vm.scheduler.park_at(wait, deadline);

@@ -32,7 +32,7 @@ pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.charge(steps);
     let Some(found) = found else { return Ok(Value::NIL) };
     vm.exchange.values.clear();
-    let known = &vm.world.known;
+    let known = &vm.names.known;
     let kind = match found.kind {
         EntryKind::HandlerCase => known.cases,
         EntryKind::Recovery => known.recovery,
@@ -231,7 +231,7 @@ pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// Returns a frame as a record of the library: see `reports.esl`.
 fn row_of(vm: &mut Vm, frame: &NotedFrame, variables: Value) -> Result<Value, AllocError> {
     let has_no_name = frame.name.is_nil() && !frame.is_top_level;
-    let name = if has_no_name { vm.heap.list(&[vm.world.known.lambda])? } else { frame.name };
+    let name = if has_no_name { vm.heap.list(&[vm.names.known.lambda])? } else { frame.name };
     let [source, line, column] = place_parts(vm, frame.place.as_ref())?;
     vm.heap.list(&[name, source, line, column, variables, Value::boolean(frame.is_of_library)])
 }

@@ -12,7 +12,7 @@ use super::expect::exactly;
 /// # Errors
 /// A failure if it is none.
 fn expect_input(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
-    if input::is_input(&vm.heap, v) { Ok(v) } else { vm.exchange.not_a(v, vm.world.known.input) }
+    if input::is_input(&vm.heap, v) { Ok(v) } else { vm.exchange.not_a(v, vm.names.known.input) }
 }
 
 /// Returns the name under which the outside knows an input: a string, or that of a symbol.

@@ -12,10 +12,10 @@
 use crate::builtins::class::superclasses;
 use crate::heap::layout::StructureObject;
 use crate::heap::{Heap, Kind};
+use crate::names::class::{self, class_slot, slot};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::class::{self, class_slot, slot};
 
 use super::expect::exactly;
 
@@ -98,7 +98,7 @@ pub(super) fn update_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return vm.exchange.type_error(class, "CLASS");
     }
     let supers = superclasses(vm, supers)?;
-    if supers.iter().any(|&parent| vm.world.is_subclass(&vm.heap, parent, class)) {
+    if supers.iter().any(|&parent| vm.names.is_subclass(&vm.heap, parent, class)) {
         let name = vm.describe(class_slot(&vm.heap, class, slot::NAME));
         return vm.exchange.program_error(format!("the class {name} cannot inherit from itself"));
     }

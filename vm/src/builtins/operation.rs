@@ -9,7 +9,7 @@ use crate::run;
 use crate::schedule::Measure;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::operation;
+use crate::wait::handle;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 
@@ -25,7 +25,7 @@ pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(Option<GivenInde
     let mut data = Vec::new();
     let mut rest = arguments;
     while let Some(pair) = vm.heap.as_cons(rest) {
-        match datum::export(&vm.heap, &vm.world, pair.car) {
+        match datum::export(&vm.heap, &vm.names, pair.car) {
             Ok((datum, work)) => {
                 vm.exchange.charge(work);
                 data.push(datum);
@@ -67,7 +67,7 @@ fn function_named(vm: &Vm, symbol: Value) -> Option<GivenIndex> {
 /// # Errors
 /// A failure if it is none.
 fn expect_handle(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
-    if operation::is_handle(&vm.heap, v) { Ok(v) } else { vm.exchange.not_a(v, vm.world.known.operation) }
+    if handle::is_handle(&vm.heap, v) { Ok(v) } else { vm.exchange.not_a(v, vm.names.known.operation) }
 }
 
 pub(super) fn begin_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -79,7 +79,7 @@ pub(super) fn begin_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     run::admit(vm, Measure::Operations)?;
     let number = vm.outside.operations.next_number();
-    let handle = operation::make(&mut vm.heap, arguments[0], number, vm.world.known.pending)?;
+    let handle = handle::make(&mut vm.heap, arguments[0], number, vm.names.known.pending)?;
     vm.scheduler.accounts.take(vm.scheduler.running_account(), Measure::Operations);
     let task = vm.scheduler.running_number();
     vm.outside.begin_operation(function, &data, handle, detached.is_true(), task);
@@ -102,7 +102,7 @@ pub(super) fn may_await(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn cancel_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let handle = expect_handle(vm, arguments[0])?;
-    vm.outside.operations.cancel(operation::number(&vm.heap, handle));
+    vm.outside.operations.cancel(handle::number(&vm.heap, handle));
     Ok(Value::NIL)
 }
 
@@ -110,29 +110,29 @@ pub(super) fn operation_state(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
     let handle = expect_handle(vm, arguments[0])?;
     let slot = |slot| vm.heap.slot_or_nil(handle, slot);
-    let values = [slot(operation::STATE), slot(operation::RESULT)];
+    let values = [slot(handle::STATE), slot(handle::RESULT)];
     vm.give_values(&values)
 }
 
 pub(super) fn operation_progress(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
     let handle = expect_handle(vm, arguments[0])?;
-    Ok(vm.heap.slot_or_nil(handle, operation::PROGRESS))
+    Ok(vm.heap.slot_or_nil(handle, handle::PROGRESS))
 }
 
 pub(super) fn operation_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let handle = expect_handle(vm, arguments[0])?;
-    Ok(Value::index(operation::number(&vm.heap, handle) as usize))
+    Ok(Value::index(handle::number(&vm.heap, handle) as usize))
 }
 
 pub(super) fn operationp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(Value::boolean(operation::is_handle(&vm.heap, arguments[0])))
+    Ok(Value::boolean(handle::is_handle(&vm.heap, arguments[0])))
 }
 
 pub(super) fn make_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     run::admit(vm, Measure::Operations)?;
     let number = vm.outside.operations.next_number();
-    let handle = operation::make(&mut vm.heap, arguments[0], number, vm.world.known.pending)?;
+    let handle = handle::make(&mut vm.heap, arguments[0], number, vm.names.known.pending)?;
     vm.scheduler.accounts.take(vm.scheduler.running_account(), Measure::Operations);
     vm.outside.operations.count();
     Ok(handle)
@@ -143,23 +143,23 @@ pub(super) fn end_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [handle, state, result] = exactly(arguments);
     let handle = expect_handle(vm, handle)?;
     vm.scheduler.wait_for_deliveries()?;
-    if vm.heap.slot_or_nil(handle, operation::STATE) == vm.world.known.pending {
+    if vm.heap.slot_or_nil(handle, handle::STATE) == vm.names.known.pending {
         vm.signal_event(handle, &[])?;
-        vm.heap.slot_set(handle, operation::RESULT, result);
-        vm.heap.slot_set(handle, operation::STATE, state);
+        vm.heap.slot_set(handle, handle::RESULT, result);
+        vm.heap.slot_set(handle, handle::STATE, state);
     }
     Ok(Value::NIL)
 }
 
 pub(super) fn operation_performer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let handle = expect_handle(vm, arguments[0])?;
-    Ok(vm.heap.slot_or_nil(handle, operation::PERFORMER))
+    Ok(vm.heap.slot_or_nil(handle, handle::PERFORMER))
 }
 
 pub(super) fn set_operation_performer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [handle, task] = exactly(arguments);
     let handle = expect_handle(vm, handle)?;
     let task = expect_task(vm, task)?;
-    vm.heap.slot_set(handle, operation::PERFORMER, task);
+    vm.heap.slot_set(handle, handle::PERFORMER, task);
     Ok(task)
 }

@@ -70,10 +70,10 @@ fn give_answer(vm: &mut Vm, answer: &Result<Datum, HostFailure>) -> Outcome {
     match answer {
         Ok(datum) => import(vm, datum),
         Err(failure) => {
-            let cause = vm.world.keyword(&mut vm.heap, &failure.cause)?;
+            let cause = vm.names.keyword(&mut vm.heap, &failure.cause)?;
             let list = Datum::list(failure.arguments.iter().cloned(), Span::default());
             let list = import(vm, &list)?;
-            vm.exchange.request_call(vm.world.known.fail_as_host, &[cause, list]);
+            vm.exchange.request_call(vm.names.known.fail_as_host, &[cause, list]);
             Err(Exit::Call)
         }
     }
@@ -81,7 +81,7 @@ fn give_answer(vm: &mut Vm, answer: &Result<Datum, HostFailure>) -> Outcome {
 
 /// Returns data as a value, and charges for it.
 fn import(vm: &mut Vm, datum: &Datum) -> Outcome {
-    let (value, work) = datum::import(&mut vm.heap, &mut vm.world, datum)?;
+    let (value, work) = datum::import(&mut vm.heap, &mut vm.names, datum)?;
     vm.exchange.charge(work);
     Ok(value)
 }

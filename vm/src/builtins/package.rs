@@ -10,10 +10,10 @@ use crate::builtins::list::list_items;
 use crate::builtins::symbol::{designated_text, text_of};
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Kind};
+use crate::names::Names;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::World;
 
 use super::expect::exactly;
 
@@ -22,11 +22,11 @@ use super::expect::exactly;
 /// # Errors
 /// A failure if there is none.
 fn designated_package(vm: &mut Vm, v: Value) -> Result<PackageId, Exit> {
-    if let Some(package) = vm.world.package_of(&vm.heap, v) {
+    if let Some(package) = vm.names.package_of(&vm.heap, v) {
         return Ok(package);
     }
     let name = designated_text(vm, v)?;
-    match vm.world.packages().named(&name) {
+    match vm.names.packages().named(&name) {
         Some(package) => Ok(package),
         None => {
             let text = format!("there is no package {name}");
@@ -57,9 +57,9 @@ fn named_symbols(vm: &mut Vm, v: Value) -> Result<Vec<Symbol>, Exit> {
     let items = if v.is_list() { list_items(vm, v, LIMIT)? } else { vec![v] };
     let mut symbols = Vec::with_capacity(items.len());
     for item in items {
-        match vm.world.name_of(&vm.heap, item) {
+        match vm.names.name_of(&vm.heap, item) {
             Some(symbol) => symbols.push(symbol),
-            None if vm.world.is_symbol(&vm.heap, item) => {
+            None if vm.names.is_symbol(&vm.heap, item) => {
                 let name = vm.describe(item);
                 return vm.exchange.program_error(format!("the symbol {name} belongs to no package"));
             }
@@ -79,7 +79,7 @@ fn checked<T>(exchange: &mut Exchange, result: Result<T, PackageError>) -> Resul
 fn package_list(vm: &mut Vm, packages: &[PackageId]) -> Outcome {
     let mut objects = Vec::with_capacity(packages.len());
     for &package in packages {
-        objects.push(vm.world.package_object(&mut vm.heap, package)?);
+        objects.push(vm.names.package_object(&mut vm.heap, package)?);
     }
     Ok(vm.heap.list(&objects)?)
 }
@@ -92,21 +92,21 @@ fn string_list(heap: &mut Heap, texts: &[String]) -> Outcome {
     Ok(heap.list(&strings)?)
 }
 
-fn status_symbol(world: &World, status: Option<Status>) -> Value {
+fn status_symbol(names: &Names, status: Option<Status>) -> Value {
     match status {
         None => Value::NIL,
-        Some(Status::Internal) => world.known.internal,
-        Some(Status::External) => world.known.external,
-        Some(Status::Inherited) => world.known.inherited,
+        Some(Status::Internal) => names.known.internal,
+        Some(Status::External) => names.known.external,
+        Some(Status::Inherited) => names.known.inherited,
     }
 }
 
 /// Returns the qualifier before the name of a symbol: nothing, `:`, `#:`, or a package with one or two
 /// colons. `None` for anything but a symbol.
 pub(crate) fn qualifier(vm: &Vm, symbol: Value) -> Option<Qualifier> {
-    match vm.world.name_of(&vm.heap, symbol) {
-        Some(name) => Some(vm.world.packages().qualifier(&name, vm.current_package())),
-        None if vm.world.is_symbol(&vm.heap, symbol) => Some(Qualifier::Uninterned),
+    match vm.names.name_of(&vm.heap, symbol) {
+        Some(name) => Some(vm.names.packages().qualifier(&name, vm.current_package())),
+        None if vm.names.is_symbol(&vm.heap, symbol) => Some(Qualifier::Uninterned),
         None => None,
     }
 }
@@ -116,8 +116,8 @@ pub(super) fn find_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Ok(arguments[0]);
     }
     let name = designated_text(vm, arguments[0])?;
-    match vm.world.packages().named(&name) {
-        Some(package) => Ok(vm.world.package_object(&mut vm.heap, package)?),
+    match vm.names.packages().named(&name) {
+        Some(package) => Ok(vm.names.package_object(&mut vm.heap, package)?),
         None => Ok(Value::NIL),
     }
 }
@@ -128,72 +128,72 @@ pub(super) fn packagep(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn package_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let package = designated_package(vm, arguments[0])?;
-    let object = vm.world.package_object(&mut vm.heap, package)?;
+    let object = vm.names.package_object(&mut vm.heap, package)?;
     Ok(vm.heap.record(object, Kind::Package).map_or(Value::NIL, |record| record[0]))
 }
 
 pub(super) fn package_nicknames(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let package = designated_package(vm, arguments[0])?;
     let names: Vec<String> =
-        vm.world.packages().nicknames(package).iter().map(|name| name.to_string()).collect();
+        vm.names.packages().nicknames(package).iter().map(|name| name.to_string()).collect();
     string_list(&mut vm.heap, &names)
 }
 
 pub(super) fn package_use_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let package = designated_package(vm, arguments[0])?;
-    let uses = vm.world.packages().uses(package).to_vec();
+    let uses = vm.names.packages().uses(package).to_vec();
     package_list(vm, &uses)
 }
 
 pub(super) fn list_all_packages(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    let all: Vec<PackageId> = vm.world.packages().all().collect();
+    let all: Vec<PackageId> = vm.names.packages().all().collect();
     package_list(vm, &all)
 }
 
 pub(super) fn make_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.world.check_room(&mut vm.heap)?;
+    vm.names.check_room(&mut vm.heap)?;
     let [name, nicknames, uses] = exactly(arguments);
     let name = designated_text(vm, name)?;
     let nicknames = designated_names(vm, nicknames)?;
     let uses = designated_packages(vm, uses)?;
     let nicknames: Vec<&str> = nicknames.iter().map(String::as_str).collect();
-    let package = match vm.world.packages().named(&name) {
+    let package = match vm.names.packages().named(&name) {
         // Reading a compiled program makes the packages of its symbols, without more.
         Some(package) => {
-            let changed = vm.world.packages_mut().add_nicknames(package, &nicknames);
+            let changed = vm.names.packages_mut().add_nicknames(package, &nicknames);
             checked(&mut vm.exchange, changed)?;
             package
         }
         None => {
-            let made = vm.world.packages_mut().make_package(&name, &nicknames, &[]);
+            let made = vm.names.packages_mut().make_package(&name, &nicknames, &[]);
             checked(&mut vm.exchange, made)?
         }
     };
     for used in uses {
-        let changed = vm.world.packages_mut().use_package(package, used);
+        let changed = vm.names.packages_mut().use_package(package, used);
         checked(&mut vm.exchange, changed)?;
     }
-    Ok(vm.world.package_object(&mut vm.heap, package)?)
+    Ok(vm.names.package_object(&mut vm.heap, package)?)
 }
 
 pub(super) fn use_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.world.check_room(&mut vm.heap)?;
+    vm.names.check_room(&mut vm.heap)?;
     let uses = designated_packages(vm, arguments[0])?;
     let package = package_or_current(vm, optional(arguments, 1))?;
     for used in uses {
-        let changed = vm.world.packages_mut().use_package(package, used);
+        let changed = vm.names.packages_mut().use_package(package, used);
         checked(&mut vm.exchange, changed)?;
     }
     Ok(Value::T)
 }
 
 pub(super) fn export(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.world.check_room(&mut vm.heap)?;
+    vm.names.check_room(&mut vm.heap)?;
     let symbols = named_symbols(vm, arguments[0])?;
     let package = package_or_current(vm, optional(arguments, 1))?;
     vm.exchange.charge(symbols.len() * 16);
     for symbol in symbols {
-        let changed = vm.world.packages_mut().export(package, &symbol);
+        let changed = vm.names.packages_mut().export(package, &symbol);
         checked(&mut vm.exchange, changed)?;
     }
     Ok(Value::T)
@@ -213,24 +213,24 @@ fn import_each(
     arguments: &[Value],
     import: fn(&mut Packages, PackageId, &Symbol) -> Result<(), PackageError>,
 ) -> Outcome {
-    vm.world.check_room(&mut vm.heap)?;
+    vm.names.check_room(&mut vm.heap)?;
     let symbols = named_symbols(vm, arguments[0])?;
     let package = package_or_current(vm, optional(arguments, 1))?;
     vm.exchange.charge(symbols.len() * 16);
     for symbol in symbols {
-        let changed = import(vm.world.packages_mut(), package, &symbol);
+        let changed = import(vm.names.packages_mut(), package, &symbol);
         checked(&mut vm.exchange, changed)?;
     }
     Ok(Value::T)
 }
 
 pub(super) fn shadow(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.world.check_room(&mut vm.heap)?;
+    vm.names.check_room(&mut vm.heap)?;
     let names = designated_names(vm, arguments[0])?;
     let package = package_or_current(vm, optional(arguments, 1))?;
     vm.exchange.charge(names.len() * 16);
     for name in names {
-        let changed = vm.world.packages_mut().shadow(package, &name);
+        let changed = vm.names.packages_mut().shadow(package, &name);
         checked(&mut vm.exchange, changed)?;
     }
     Ok(Value::T)
@@ -242,9 +242,9 @@ pub(super) fn intern(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     let package = package_or_current(vm, optional(arguments, 1))?;
     vm.exchange.charge(name.len());
-    let (symbol, status) = vm.world.packages_mut().intern(package, &name);
-    let value = vm.world.intern(&mut vm.heap, &symbol)?;
-    let status = status_symbol(&vm.world, status);
+    let (symbol, status) = vm.names.packages_mut().intern(package, &name);
+    let value = vm.names.intern(&mut vm.heap, &symbol)?;
+    let status = status_symbol(&vm.names, status);
     vm.give_values(&[value, status])
 }
 
@@ -254,10 +254,10 @@ pub(super) fn find_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     let package = package_or_current(vm, optional(arguments, 1))?;
     vm.exchange.charge(name.len());
-    match vm.world.packages().find(package, &name) {
+    match vm.names.packages().find(package, &name) {
         Some((symbol, status)) => {
-            let value = vm.world.intern(&mut vm.heap, &symbol)?;
-            let status = status_symbol(&vm.world, Some(status));
+            let value = vm.names.intern(&mut vm.heap, &symbol)?;
+            let status = status_symbol(&vm.names, Some(status));
             vm.give_values(&[value, status])
         }
         None => vm.give_values(&[Value::NIL, Value::NIL]),
@@ -266,21 +266,21 @@ pub(super) fn find_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn external_symbols(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let package = designated_package(vm, arguments[0])?;
-    let names = vm.world.packages().external_names(package);
+    let names = vm.names.packages().external_names(package);
     let symbols = symbols_named(vm, package, &names);
     list_of_symbols(vm, &symbols)
 }
 
 pub(super) fn accessible_symbols(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let package = designated_package(vm, arguments[0])?;
-    let names = vm.world.packages().accessible_names(package);
+    let names = vm.names.packages().accessible_names(package);
     let symbols = symbols_named(vm, package, &names);
     list_of_symbols(vm, &symbols)
 }
 
 /// Returns the symbols that `names` denote in `package`.
 fn symbols_named(vm: &Vm, package: PackageId, names: &BTreeSet<&str>) -> Vec<Symbol> {
-    let packages = vm.world.packages();
+    let packages = vm.names.packages();
     names.iter().filter_map(|name| packages.find(package, name)).map(|(symbol, _)| symbol).collect()
 }
 
@@ -289,7 +289,7 @@ fn list_of_symbols(vm: &mut Vm, symbols: &[Symbol]) -> Outcome {
     vm.exchange.charge(symbols.len() * 16);
     let mut values = Vec::with_capacity(symbols.len());
     for symbol in symbols {
-        values.push(vm.world.intern(&mut vm.heap, symbol)?);
+        values.push(vm.names.intern(&mut vm.heap, symbol)?);
     }
     Ok(vm.heap.list(&values)?)
 }

@@ -33,10 +33,10 @@ pub(super) fn read_datum(
     start: usize,
     name: Option<&str>,
 ) -> Result<ReadOutcome, Exit> {
-    if let Some(base) = vm.symbol_value(vm.world.known.read_base) {
+    if let Some(base) = vm.symbol_value(vm.names.known.read_base) {
         radix(vm, base)?;
     }
-    vm.world.check_room(&mut vm.heap)?;
+    vm.names.check_room(&mut vm.heap)?;
     let read = environment::with_compiler(vm, |vm, compiler| {
         let read = compiler.read(vm, text, start);
         read.map_err(|diagnostic| ReadFault { text: compiler.render(&diagnostic, name, text), diagnostic })
@@ -72,7 +72,7 @@ fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<FirstRead>, 
         }
         ReadOutcome::End | ReadOutcome::Fault(_) if then != Then::End => return Ok(None),
         ReadOutcome::End => read([Value::NIL; 3], text.len()),
-        ReadOutcome::Fault(_) => read([vm.world.known.unfinished, Value::NIL, Value::NIL], text.len()),
+        ReadOutcome::Fault(_) => read([vm.names.known.unfinished, Value::NIL, Value::NIL], text.len()),
     }))
 }
 
@@ -87,7 +87,7 @@ struct FirstRead {
 /// Returns a datum that was read as an object, and the list of the calls in it.
 pub(super) fn read_object(vm: &mut Vm, datum: &Datum) -> Result<(Value, Value), Exit> {
     let mut unit = Unit::default();
-    let value = unit.value_of(&mut vm.heap, &mut vm.world, datum);
+    let value = unit.value_of(&mut vm.heap, &mut vm.names, datum);
     vm.exchange.charge(unit.take_work() as usize);
     let calls = vm.heap.list(&unit.take_calls())?;
     Ok((value?, calls))

@@ -1,11 +1,11 @@
 //! Rights: asking for them, and narrowing them.
 //!
-//! Narrowed rights are a binding of a symbol that no program can name ([`World::rights`]), so that
+//! Narrowed rights are a binding of a symbol that no program can name ([`Names::rights`]), so that
 //! nothing can set it back, and tasks inherit it as they do all bindings. Its value is a list of strings, the
 //! innermost form's first, each of which writes [`Rights`] as a text that is made here and reaches no
 //! program. Rights that flags of a command have set say so, since another flag would widen them.
 //!
-//! [`World::rights`]: crate::world::World
+//! [`Names::rights`]: crate::names::Names
 
 use esl_host::{Host, Permit, Right, Rights};
 
@@ -67,7 +67,7 @@ fn narrowed(vm: &mut Vm) -> (Vec<Rights>, Vec<Rights>) {
 /// Returns the list of what is narrowed in the running task.
 pub(super) fn in_force(vm: &Vm) -> Value {
     let control = vm.scheduler.running.as_ref().and_then(|task| task.control.get());
-    control.and_then(|control| control.bindings.get(vm.world.rights)).unwrap_or(Value::NIL)
+    control.and_then(|control| control.bindings.get(vm.names.rights)).unwrap_or(Value::NIL)
 }
 
 fn decode(text: &str) -> Rights {
@@ -126,7 +126,7 @@ pub(super) fn narrow_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     let text = vm.heap.alloc_str(&text)?;
     let value = vm.heap.cons(text, in_force(vm))?;
-    let symbol = vm.world.rights;
+    let symbol = vm.names.rights;
     if vm.scheduler.task().control.bindings.is_full() {
         vm.reserve_bindings()?;
     }
@@ -140,7 +140,7 @@ pub(super) fn narrow_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// form has.
 pub(super) fn lend_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [index, data] = exactly(arguments);
-    let symbol = vm.world.rights;
+    let symbol = vm.names.rights;
     let known = vm.heap.vector(data).and_then(|items| items.first().copied()).unwrap_or(Value::NIL);
     if vm.scheduler.task().control.bindings.get(symbol).is_none() {
         // There is nothing to lend.

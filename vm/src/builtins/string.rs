@@ -29,7 +29,7 @@ pub(crate) fn string_designator(vm: &mut Vm, v: Value) -> Outcome {
     if let Some(code) = v.as_character() {
         return Ok(vm.heap.alloc_string(&[code])?);
     }
-    match vm.world.object_of(&vm.heap, v).and_then(|object| vm.heap.symbol(object)) {
+    match vm.names.object_of(&vm.heap, v).and_then(|object| vm.heap.symbol(object)) {
         Some(symbol) => Ok(symbol.name),
         None => vm.exchange.not_written(v, "(OR STRING SYMBOL CHARACTER)"),
     }

@@ -10,9 +10,9 @@ use super::expect::exactly;
 /// Checks that `instance` is one of the class named `name` and has the slot.
 fn check(vm: &mut Vm, name: Value, index: Value, instance: Value) -> Result<usize, Exit> {
     let slots = vm.heap.structure_slots(instance).map(<[Value]>::len);
-    match (vm.world.find_class(name), slots, index.as_index()) {
+    match (vm.names.find_class(name), slots, index.as_index()) {
         (Some(class), Some(slots), Some(index))
-            if index < slots && vm.world.is_instance(&vm.heap, instance, class) =>
+            if index < slots && vm.names.is_instance(&vm.heap, instance, class) =>
         {
             Ok(index)
         }
@@ -35,6 +35,6 @@ pub(super) fn set_slot(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn is_instance(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [class, object] = exactly(arguments);
-    let class = vm.world.find_class(class);
-    Ok(class.is_some_and(|class| vm.world.is_instance(&vm.heap, object, class)).into())
+    let class = vm.names.find_class(class);
+    Ok(class.is_some_and(|class| vm.names.is_instance(&vm.heap, object, class)).into())
 }

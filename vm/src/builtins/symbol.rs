@@ -36,7 +36,7 @@ pub(crate) fn designated_text(vm: &mut Vm, v: Value) -> Result<String, Exit> {
     if let Some(code) = v.as_character() {
         return Ok(char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER).into());
     }
-    match vm.world.object_of(&vm.heap, v).and_then(|object| vm.heap.symbol(object)) {
+    match vm.names.object_of(&vm.heap, v).and_then(|object| vm.heap.symbol(object)) {
         Some(cell) => Ok(vm.heap.string_text(cell.name).unwrap_or_default()),
         None => vm.exchange.not_written(v, "(OR STRING SYMBOL CHARACTER)"),
     }
@@ -59,22 +59,22 @@ pub(crate) fn text_between(heap: &Heap, v: Value, start: usize, end: usize) -> S
 /// # Errors
 /// `type-error` if it is not the name of a function.
 pub(crate) fn cell_of_function(vm: &mut Vm, name: Value) -> Result<Value, Exit> {
-    if vm.world.is_symbol(&vm.heap, name) {
+    if vm.names.is_symbol(&vm.heap, name) {
         return Ok(name);
     }
     match vm.heap.as_cons(name) {
-        Some(pair) if pair.car == vm.world.known.setf => {
+        Some(pair) if pair.car == vm.names.known.setf => {
             let symbol = match vm.heap.as_cons(pair.cdr) {
                 Some(rest) if rest.cdr == Value::NIL => rest.car,
                 _ => {
                     return vm.exchange.not_written(name, "(OR SYMBOL (CONS (EQL SETF) (CONS SYMBOL NULL)))");
                 }
             };
-            if let Some(symbol) = vm.world.name_of(&vm.heap, symbol) {
-                return Ok(vm.world.intern(&mut vm.heap, &setf_cell(&symbol))?);
+            if let Some(symbol) = vm.names.name_of(&vm.heap, symbol) {
+                return Ok(vm.names.intern(&mut vm.heap, &setf_cell(&symbol))?);
             }
             let object = symbol_object(vm, symbol)?;
-            Ok(vm.world.setf_cell_object(&mut vm.heap, object)?)
+            Ok(vm.names.setf_cell_object(&mut vm.heap, object)?)
         }
         _ => vm.exchange.not_written(name, "(OR SYMBOL (CONS (EQL SETF) (CONS SYMBOL NULL)))"),
     }
@@ -160,14 +160,14 @@ pub(super) fn makunbound(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn fboundp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbol = cell_of_function(vm, arguments[0])?;
-    let is_bound = vm.world.function_of(&vm.heap, symbol).is_some()
-        || vm.world.macro_function_of(&vm.heap, symbol).is_some();
+    let is_bound = vm.names.function_of(&vm.heap, symbol).is_some()
+        || vm.names.macro_function_of(&vm.heap, symbol).is_some();
     Ok(Value::boolean(is_bound))
 }
 
 pub(super) fn fdefinition(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbol = cell_of_function(vm, arguments[0])?;
-    match vm.world.function_of(&vm.heap, symbol).or(vm.world.macro_function_of(&vm.heap, symbol)) {
+    match vm.names.function_of(&vm.heap, symbol).or(vm.names.macro_function_of(&vm.heap, symbol)) {
         Some(function) => Ok(function),
         None => vm.exchange.raise(Raised::UndefinedFunction(arguments[0])),
     }
@@ -176,7 +176,7 @@ pub(super) fn fdefinition(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn fmakunbound(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbol = cell_of_function(vm, arguments[0])?;
     let object = definable(vm, symbol, "function")?;
-    vm.world.remove_function(&mut vm.heap, symbol)?;
+    vm.names.remove_function(&mut vm.heap, symbol)?;
     vm.heap.symbol_set_macro_function(object, Value::NIL);
     Ok(arguments[0])
 }
@@ -196,7 +196,7 @@ pub(super) fn macro_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             return Ok(pair.cdr);
         }
     }
-    Ok(vm.world.macro_function_of(&vm.heap, object).unwrap_or(Value::NIL))
+    Ok(vm.names.macro_function_of(&vm.heap, object).unwrap_or(Value::NIL))
 }
 
 pub(super) fn special_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -211,7 +211,7 @@ pub(super) fn constant_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn locked_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     symbol_object(vm, arguments[0])?;
-    Ok(Value::boolean(vm.world.is_locked(&vm.heap, arguments[0])))
+    Ok(Value::boolean(vm.names.is_locked(&vm.heap, arguments[0])))
 }
 
 pub(super) fn make_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -220,13 +220,13 @@ pub(super) fn make_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     vm.exchange.charge(text.len());
     let name = vm.heap.alloc_str(&text)?;
-    Ok(vm.world.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
+    Ok(vm.names.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
 }
 
 /// An integer in place of the prefix is the number to use.
 pub(super) fn gensym(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let given = optional(arguments, 0);
-    let counter = vm.world.known.gensym_counter;
+    let counter = vm.names.known.gensym_counter;
     if given.as_index().is_some() {
         return named_symbol(vm, "G", given);
     }
@@ -251,7 +251,7 @@ pub(super) fn gensym(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn named_symbol(vm: &mut Vm, prefix: &str, number: Value) -> Outcome {
     let number = number.as_fixnum().unwrap_or(0);
     let name = vm.heap.alloc_str(&format!("{prefix}{number}"))?;
-    Ok(vm.world.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
+    Ok(vm.names.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
 }
 
 pub(super) fn function_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -275,7 +275,7 @@ pub(super) fn function_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return vm.exchange.type_error(arguments[0], "FUNCTION");
     };
     // Instructions before the first call may have no place.
-    let place = (0..WORDS_TO_PLACE).find_map(|pc| vm.world.source_place(&vm.heap, code, pc));
+    let place = (0..WORDS_TO_PLACE).find_map(|pc| vm.names.source_place(&vm.heap, code, pc));
     let Some(place) = place else { return Ok(Value::NIL) };
     let source = vm.heap.alloc_str(&place.source)?;
     Ok(vm.heap.list(&[source, Value::index(place.line as usize), Value::index(place.column as usize)])?)
@@ -283,7 +283,7 @@ pub(super) fn function_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// Returns the lambda list and the documentation of a function.
 fn texts(vm: &mut Vm, function: Value) -> Result<(Value, Value), Exit> {
-    let texts = vm.world.texts_of_function(&mut vm.heap, function);
+    let texts = vm.names.texts_of_function(&mut vm.heap, function);
     match vm.exchange.loaded(texts)? {
         Some(texts) => Ok(texts),
         None => vm.exchange.type_error(function, "FUNCTION"),

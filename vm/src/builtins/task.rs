@@ -23,7 +23,7 @@ const MAX_LIMITS: usize = 10_000;
 /// # Errors
 /// A failure if it is none.
 pub(super) fn expect_task(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
-    if vm.heap.is(v, Kind::Task) { Ok(v) } else { vm.exchange.not_a(v, vm.world.known.task) }
+    if vm.heap.is(v, Kind::Task) { Ok(v) } else { vm.exchange.not_a(v, vm.names.known.task) }
 }
 
 /// Returns whether a task has ended.
@@ -47,7 +47,7 @@ fn wait_for_end(vm: &mut Vm, task: Value, urgent: bool, child: bool) -> Option<O
         vm.scheduler.cancel_wait(&mut vm.heap);
         return None;
     }
-    let what = vm.world.known.task_end;
+    let what = vm.names.known.task_end;
     let options = WaitOptions { urgent, child, what, ..WaitOptions::default() };
     Some(take_or_park(vm, task, options))
 }
@@ -74,13 +74,13 @@ pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         v => Some(ticks_argument(vm, v)?),
     };
     let daemon = argument(4);
-    let is_service = daemon == vm.world.known.service;
+    let is_service = daemon == vm.names.known.service;
     let options = SpawnOptions {
         name: argument(1),
         priority,
         budget,
         daemon: daemon.is_true(),
-        hidden: daemon == vm.world.known.internal || is_service,
+        hidden: daemon == vm.names.known.internal || is_service,
         is_service,
         notify: argument(5),
     };
@@ -101,7 +101,7 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = expect_task(vm, arguments[0])?;
     let state = vm.heap.slot_or_nil(task, event::STATE);
     let Some(index) = event::task_index(&vm.heap, task) else { return Ok(state) };
-    let known = &vm.world.known;
+    let known = &vm.names.known;
     let task = vm.scheduler.tasks.at(index);
     Ok(match task.map(|task| task.state) {
         Some(TaskState::Waiting) if task.is_some_and(|task| vm.scheduler.is_suspended(&vm.heap, task)) => {
@@ -143,7 +143,7 @@ fn give_end(vm: &mut Vm, task: Value) -> Outcome {
     let has_one_value = vm.heap.header(task).is_some_and(|header| header.aux == 1);
     vm.exchange.values.clear();
     vm.exchange.values.push(status);
-    if status == vm.world.known.failed {
+    if status == vm.names.known.failed {
         vm.exchange.values.push(event::failure(&vm.heap, result).0);
     } else if has_one_value {
         vm.exchange.values.push(result);
@@ -159,7 +159,7 @@ fn give_end(vm: &mut Vm, task: Value) -> Outcome {
 
 pub(super) fn task_failure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = expect_task(vm, arguments[0])?;
-    if vm.heap.slot_or_nil(task, event::STATE) != vm.world.known.failed {
+    if vm.heap.slot_or_nil(task, event::STATE) != vm.names.known.failed {
         return Ok(Value::NIL);
     }
     let (condition, history) = event::failure(&vm.heap, vm.heap.slot_or_nil(task, event::RESULT));
@@ -168,7 +168,7 @@ pub(super) fn task_failure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn task_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = expect_task(vm, arguments[0])?;
-    if vm.heap.slot_or_nil(task, event::STATE) != vm.world.known.succeeded {
+    if vm.heap.slot_or_nil(task, event::STATE) != vm.names.known.succeeded {
         return Ok(Value::NIL);
     }
     let result = vm.heap.slot_or_nil(task, event::RESULT);

@@ -8,8 +8,8 @@ use esl_bytecode::locals::{LocalDefinition, LocalMeaning, Locals};
 
 use super::Unit;
 use crate::heap::{AllocError, Heap};
+use crate::names::Names;
 use crate::value::Value;
-use crate::world::World;
 
 /// The environments of the last macro call and of the forms around it, the outermost first: what two calls
 /// have in common is made once.
@@ -36,7 +36,7 @@ impl Unit {
     pub(crate) fn environment(
         &mut self,
         heap: &mut Heap,
-        world: &mut World,
+        names: &mut Names,
         locals: &Locals,
     ) -> Result<Value, AllocError> {
         let depth = locals.innermost().map_or(0, |innermost| innermost.depth);
@@ -55,7 +55,7 @@ impl Unit {
         let mut environment = self.environments.0.last().map_or(Value::NIL, |&(_, environment)| environment);
         for locals in missing.into_iter().rev() {
             let Some(definition) = locals.innermost() else { continue };
-            let entry = self.entry(heap, world, definition)?;
+            let entry = self.entry(heap, names, definition)?;
             environment = heap.cons(entry, environment)?;
             self.environments.0.push((locals.clone(), environment));
             self.work += 1;
@@ -66,16 +66,16 @@ impl Unit {
     fn entry(
         &mut self,
         heap: &mut Heap,
-        world: &mut World,
+        names: &mut Names,
         definition: &LocalDefinition,
     ) -> Result<Value, AllocError> {
-        let name = self.symbol_object(heap, world, &definition.name)?;
+        let name = self.symbol_object(heap, names, &definition.name)?;
         let (key, value) = match &definition.meaning {
             LocalMeaning::Function => (name, Value::NIL),
             LocalMeaning::Macro(function) => (name, self.pinned(*function).unwrap_or(Value::NIL)),
             LocalMeaning::Variable => (heap.cons(name, Value::NIL)?, Value::NIL),
             LocalMeaning::SymbolMacro(form) => {
-                let form = self.value_of(heap, world, form)?;
+                let form = self.value_of(heap, names, form)?;
                 (heap.cons(name, form)?, Value::T)
             }
         };

@@ -23,9 +23,9 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Home, Symbol, symbol_of_setf_cell};
 
 use crate::heap::{AllocError, Heap};
+use crate::names::load::{SharedObjects, array, character, integer, ratio};
+use crate::names::{GivenMap, GivenSet, Names, RootMap};
 use crate::value::Value;
-use crate::world::load::{SharedObjects, array, character, integer, ratio};
-use crate::world::{GivenMap, GivenSet, RootMap, World};
 
 use environment::Environments;
 pub(crate) use walk::DatumWalk;
@@ -200,7 +200,7 @@ impl Unit {
     pub(crate) fn value_of(
         &mut self,
         heap: &mut Heap,
-        world: &mut World,
+        names: &mut Names,
         datum: &Datum,
     ) -> Result<Value, AllocError> {
         if self.data.len() > MAX_REMEMBERED {
@@ -230,7 +230,7 @@ impl Unit {
                         DatumKind::Call(call) => {
                             steps.extend([ToValue::Build(datum), ToValue::Visit(call)]);
                         }
-                        _ => made.push(self.atom_value(heap, world, datum)?),
+                        _ => made.push(self.atom_value(heap, names, datum)?),
                     }
                 }
                 ToValue::Build(datum) => {
@@ -257,9 +257,9 @@ impl Unit {
         Ok(made.pop().unwrap_or(Value::NIL))
     }
 
-    fn atom_value(&mut self, heap: &mut Heap, world: &mut World, datum: &Datum) -> Result<Value, AllocError> {
+    fn atom_value(&mut self, heap: &mut Heap, names: &mut Names, datum: &Datum) -> Result<Value, AllocError> {
         Ok(match datum.kind() {
-            DatumKind::Symbol(symbol) => self.symbol_object(heap, world, symbol)?,
+            DatumKind::Symbol(symbol) => self.symbol_object(heap, names, symbol)?,
             DatumKind::Integer(value) => integer(heap, value)?,
             DatumKind::Ratio(numerator, denominator) => ratio(heap, numerator, denominator)?,
             DatumKind::Float(value) => heap.float(*value)?,
@@ -270,7 +270,7 @@ impl Unit {
                 value
             }
             DatumKind::Object(id) => self.pinned(*id).unwrap_or(Value::NIL),
-            DatumKind::Opaque(opaque) => world.opaque_object(heap, opaque)?,
+            DatumKind::Opaque(opaque) => names.opaque_object(heap, opaque)?,
             DatumKind::Nil
             | DatumKind::Cons(..)
             | DatumKind::Vector(_)
@@ -286,19 +286,19 @@ impl Unit {
     pub(crate) fn symbol_object(
         &mut self,
         heap: &mut Heap,
-        world: &mut World,
+        names: &mut Names,
         symbol: &Symbol,
     ) -> Result<Value, AllocError> {
-        let Home::Uninterned(id) = *symbol.home() else { return world.intern(heap, symbol) };
+        let Home::Uninterned(id) = *symbol.home() else { return names.intern(heap, symbol) };
         if let Some(object) = self.uninterned(id) {
             return Ok(object);
         }
         let object = match symbol_of_setf_cell(symbol) {
             Some(named) => {
-                let named = self.symbol_object(heap, world, &named)?;
-                world.setf_cell_object(heap, named)?
+                let named = self.symbol_object(heap, names, &named)?;
+                names.setf_cell_object(heap, named)?
             }
-            None => world.intern(heap, symbol)?,
+            None => names.intern(heap, symbol)?,
         };
         self.note_uninterned(id, object);
         Ok(object)
@@ -311,14 +311,14 @@ impl Unit {
     pub(crate) fn datum_of(
         &mut self,
         heap: &Heap,
-        world: &World,
+        names: &Names,
         object: Value,
         span: Span,
     ) -> Result<Datum, DatumError> {
         let mut walk = DatumWalk::new(object, span);
         let mut left = usize::MAX;
         loop {
-            if let Some(datum) = walk.run(self, heap, world, &mut left)? {
+            if let Some(datum) = walk.run(self, heap, names, &mut left)? {
                 return Ok(datum);
             }
         }
@@ -360,15 +360,15 @@ impl Unit {
 
     /// Returns the datum that an object was made from. Of an atom that has none, returns a datum without a
     /// place.
-    pub(crate) fn origin_of(&mut self, heap: &Heap, world: &World, object: Value) -> Option<Datum> {
+    pub(crate) fn origin_of(&mut self, heap: &Heap, names: &Names, object: Value) -> Option<Datum> {
         let known = self.data.get(&object.bits()).map(|(_, datum)| datum.clone());
         known.or_else(|| match parts_of(heap, object) {
             Some(_) => None,
-            None => self.atom_kind(heap, world, object).map(|kind| Datum::new(kind, Span::default())),
+            None => self.atom_kind(heap, names, object).map(|kind| Datum::new(kind, Span::default())),
         })
     }
 
-    fn atom_datum(&mut self, heap: &Heap, world: &World, object: Value, span: Span) -> Datum {
+    fn atom_datum(&mut self, heap: &Heap, names: &Names, object: Value, span: Span) -> Datum {
         if let Some((_, datum)) = self.data.get(&object.bits())
             && let DatumKind::String(text) = datum.kind()
             && heap
@@ -377,7 +377,7 @@ impl Unit {
         {
             return datum.clone();
         }
-        let kind = self.atom_kind(heap, world, object);
+        let kind = self.atom_kind(heap, names, object);
         let datum = match kind {
             Some(kind) => Datum::of_kind(kind, span),
             None => Datum::new(DatumKind::Object(self.pin(object)), span),
@@ -389,17 +389,17 @@ impl Unit {
     }
 
     /// Returns the datum that describes an atom, if there is one.
-    fn atom_kind(&mut self, heap: &Heap, world: &World, object: Value) -> Option<DatumKind> {
-        if world.is_symbol(heap, object) && !object.is_nil() {
-            return Some(DatumKind::Symbol(self.symbol_name(heap, world, object)?));
+    fn atom_kind(&mut self, heap: &Heap, names: &Names, object: Value) -> Option<DatumKind> {
+        if names.is_symbol(heap, object) && !object.is_nil() {
+            return Some(DatumKind::Symbol(self.symbol_name(heap, names, object)?));
         }
-        let opaque = || world.opaque_of(heap, object).filter(|_| self.is_for_embedder);
+        let opaque = || names.opaque_of(heap, object).filter(|_| self.is_for_embedder);
         plain_kind(heap, object).or_else(|| Some(opaque()?.kind().clone()))
     }
 
     /// As [`Unit::datum_of`]; an object that no datum can describe is represented as a whole.
-    pub(crate) fn datum_or_object(&mut self, heap: &Heap, world: &World, object: Value, span: Span) -> Datum {
-        self.datum_of(heap, world, object, span)
+    pub(crate) fn datum_or_object(&mut self, heap: &Heap, names: &Names, object: Value, span: Span) -> Datum {
+        self.datum_of(heap, names, object, span)
             .unwrap_or_else(|_| Datum::new(DatumKind::Object(self.pin(object)), span))
     }
 
@@ -412,15 +412,15 @@ impl Unit {
     }
 
     /// Returns the compiler's name for a symbol.
-    pub(crate) fn symbol_name(&mut self, heap: &Heap, world: &World, object: Value) -> Option<Symbol> {
-        if let Some(symbol) = world.name_of(heap, object) {
+    pub(crate) fn symbol_name(&mut self, heap: &Heap, names: &Names, object: Value) -> Option<Symbol> {
+        if let Some(symbol) = names.name_of(heap, object) {
             return Some(symbol);
         }
         let name = heap.string_text(heap.symbol(object)?.name)?;
         if let Some(&id) = self.uninterned_ids.get(&object.bits()) {
             return Some(Symbol::uninterned(id, &name));
         }
-        let id = world.fresh();
+        let id = names.fresh();
         self.note_uninterned(id, object);
         Some(Symbol::uninterned(id, &name))
     }
@@ -459,17 +459,17 @@ fn is_equivalent(a: &Datum, b: &Datum) -> bool {
 ///
 /// # Errors
 /// [`DatumError`].
-pub(crate) fn export(heap: &Heap, world: &World, value: Value) -> Result<(Datum, usize), DatumError> {
+pub(crate) fn export(heap: &Heap, names: &Names, value: Value) -> Result<(Datum, usize), DatumError> {
     // An atom shares nothing with other parts, so it needs neither walk nor memory.
     let plain = || Some(Datum::new(plain_kind(heap, value)?, Span::default()));
-    if let Some(datum) = world.opaque_of(heap, value).cloned().or_else(plain) {
+    if let Some(datum) = names.opaque_of(heap, value).cloned().or_else(plain) {
         return Ok((datum, 1));
     }
     let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
-    if world.is_symbol(heap, value) {
-        return Ok((unit.atom_datum(heap, world, value, Span::default()), 1));
+    if names.is_symbol(heap, value) {
+        return Ok((unit.atom_datum(heap, names, value, Span::default()), 1));
     }
-    Ok((unit.datum_of(heap, world, value, Span::default())?, unit.take_work() as usize))
+    Ok((unit.datum_of(heap, names, value, Span::default())?, unit.take_work() as usize))
 }
 
 /// Returns data as a value, and the work that it took.
@@ -478,7 +478,7 @@ pub(crate) fn export(heap: &Heap, world: &World, value: Value) -> Result<(Datum,
 /// As for every allocation.
 pub(crate) fn import(
     heap: &mut Heap,
-    world: &mut World,
+    names: &mut Names,
     datum: &Datum,
 ) -> Result<(Value, usize), AllocError> {
     if let DatumKind::String(text) = datum.kind() {
@@ -486,9 +486,9 @@ pub(crate) fn import(
     }
     let mut unit = Unit::default();
     if !datum.is_compound() {
-        return Ok((unit.atom_value(heap, world, datum)?, 1));
+        return Ok((unit.atom_value(heap, names, datum)?, 1));
     }
-    Ok((unit.value_of(heap, world, datum)?, unit.take_work() as usize))
+    Ok((unit.value_of(heap, names, datum)?, unit.take_work() as usize))
 }
 
 #[cfg(test)]

@@ -4,23 +4,23 @@ use esl_bytecode::span::SourceId;
 
 struct Fixture {
     heap: Heap,
-    world: World,
+    names: Names,
     unit: Unit,
 }
 
 impl Fixture {
     fn new() -> Fixture {
         let mut heap = crate::trust::heap_for_tests();
-        let world = World::new(&mut heap).unwrap();
-        Fixture { heap, world, unit: Unit::default() }
+        let names = Names::new(&mut heap).unwrap();
+        Fixture { heap, names, unit: Unit::default() }
     }
 
     fn value_of(&mut self, datum: &Datum) -> Value {
-        self.unit.value_of(&mut self.heap, &mut self.world, datum).unwrap()
+        self.unit.value_of(&mut self.heap, &mut self.names, datum).unwrap()
     }
 
     fn datum_of(&mut self, value: Value) -> Result<Datum, DatumError> {
-        self.unit.datum_of(&self.heap, &self.world, value, at(99))
+        self.unit.datum_of(&self.heap, &self.names, value, at(99))
     }
 }
 
@@ -115,7 +115,7 @@ fn uninterned_symbols_and_objects_keep_their_identity() {
     assert_eq!(fixture.datum_of(first).unwrap().as_symbol(), g.as_symbol());
 
     let name = fixture.heap.alloc_str("H").unwrap();
-    let made = fixture.world.make_symbol(&mut fixture.heap, name, Value::NIL, 0).unwrap();
+    let made = fixture.names.make_symbol(&mut fixture.heap, name, Value::NIL, 0).unwrap();
     let back = fixture.datum_of(made).unwrap();
     assert_eq!(fixture.value_of(&back), made);
     assert_ne!(back.as_symbol(), fixture.datum_of(first).unwrap().as_symbol());

@@ -6,9 +6,9 @@ use esl_bytecode::span::Span;
 use super::{DatumError, MAX_NODES, NODE_BYTES, Unit};
 use crate::heap::layout::Array;
 use crate::heap::{Heap, Kind};
+use crate::names::load::integer_of;
+use crate::names::{GivenSet, Names, RootMap};
 use crate::value::Value;
-use crate::world::load::integer_of;
-use crate::world::{GivenSet, RootMap, World};
 
 /// Circular literals in one form, at most.
 const MAX_CIRCULAR: usize = 64;
@@ -91,11 +91,11 @@ impl DatumWalk {
         &mut self,
         unit: &mut Unit,
         heap: &Heap,
-        world: &World,
+        names: &Names,
         left: &mut usize,
     ) -> Result<Option<Datum>, DatumError> {
         let start = self.nodes;
-        let outcome = self.go_on(unit, heap, world, left);
+        let outcome = self.go_on(unit, heap, names, left);
         unit.work += (self.nodes - start) as u64;
         match outcome {
             Ok(datum) => Ok(datum),
@@ -116,7 +116,7 @@ impl DatumWalk {
         &mut self,
         unit: &mut Unit,
         heap: &Heap,
-        world: &World,
+        names: &Names,
         left: &mut usize,
     ) -> Result<Option<Datum>, WalkError> {
         let span = self.span;
@@ -143,12 +143,12 @@ impl DatumWalk {
                         continue;
                     }
                     let Some(parts) = parts_of(heap, object) else {
-                        self.made.push(unit.atom_datum(heap, world, object, span));
+                        self.made.push(unit.atom_datum(heap, names, object, span));
                         continue;
                     };
                     match self.met.get(&object.bits()) {
                         Some((_, Some(datum))) => self.made.push(datum.clone()),
-                        Some((_, None)) => return Err(circle(heap, world, &self.steps)),
+                        Some((_, None)) => return Err(circle(heap, names, &self.steps)),
                         None => {
                             self.met.insert(object.bits(), (object, None));
                             let count = match &parts {
@@ -156,7 +156,7 @@ impl DatumWalk {
                                 ObjectParts::Items(_, items) => items.len(),
                             };
                             if self.keeps_literals
-                                && let Some(quoted) = quoted_in(heap, world, object)
+                                && let Some(quoted) = quoted_in(heap, names, object)
                                 && is_large(heap, quoted)
                             {
                                 self.wholes.insert(quoted.bits());
@@ -203,16 +203,16 @@ fn is_large(heap: &Heap, object: Value) -> bool {
 }
 
 /// Returns the object in a form `(quote object)`.
-fn quoted_in(heap: &Heap, world: &World, form: Value) -> Option<Value> {
-    let pair = heap.as_cons(form).filter(|pair| pair.car == world.known.quote)?;
+fn quoted_in(heap: &Heap, names: &Names, form: Value) -> Option<Value> {
+    let pair = heap.as_cons(form).filter(|pair| pair.car == names.known.quote)?;
     let rest = heap.as_cons(pair.cdr).filter(|rest| rest.cdr.is_nil())?;
     Some(rest.car)
 }
 
 /// Returns the error for an object that the steps of a walk have met within itself.
-fn circle(heap: &Heap, world: &World, steps: &[ToDatum]) -> WalkError {
+fn circle(heap: &Heap, names: &Names, steps: &[ToDatum]) -> WalkError {
     let quoted = steps.iter().rev().find_map(|step| match step {
-        ToDatum::Build(form, _) => quoted_in(heap, world, *form),
+        ToDatum::Build(form, _) => quoted_in(heap, names, *form),
         ToDatum::Visit(_) => None,
     });
     quoted.map_or(WalkError::Datum(DatumError::Circular), WalkError::Quoted)

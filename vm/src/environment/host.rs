@@ -15,11 +15,11 @@ use esl_bytecode::operand::*;
 
 use crate::datum::{DatumError, Unit};
 use crate::heap::{AllocError, Holder};
+use crate::names::load::{Alone, LoadError, load};
 use crate::raise::Exit;
 use crate::run::{CallError, take_in};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::load::{Alone, LoadError, load};
 
 /// Greatest number of ticks of a macro call; a longer one counts as endless.
 const MACRO_TICKS: u64 = 50_000_000;
@@ -54,7 +54,7 @@ impl Vm {
     /// # Errors
     /// [`LoadError`].
     pub fn load_module(&mut self, module: &Module) -> Result<Value, LoadError> {
-        with_room(self, |vm| load(&mut vm.heap, &mut vm.world, module, &mut Alone::default()))
+        with_room(self, |vm| load(&mut vm.heap, &mut vm.names, module, &mut Alone::default()))
     }
 
     /// Adds an image, such as that of the library. Returns the functions that run its top-level forms, in
@@ -64,17 +64,17 @@ impl Vm {
     /// [`LoadError`].
     pub fn open_image(&mut self, image: ModuleImage) -> Result<Value, LoadError> {
         let image = Arc::new(image);
-        with_room(self, |vm| vm.world.open_image(&mut vm.heap, image.clone()))
+        with_room(self, |vm| vm.names.open_image(&mut vm.heap, image.clone()))
     }
 
     /// Seals the language: from here on, its names cannot be defined again.
     pub fn seal(&mut self) {
-        self.world.is_open = false;
+        self.names.is_open = false;
     }
 
     /// Unseals the language, until [`Vm::seal`]: for tests that put a defect into the library.
     pub fn unseal(&mut self) {
-        self.world.is_open = true;
+        self.names.is_open = true;
     }
 
     /// Runs the functions of a loaded module one after the other, in one task. Returns the value of the last.
@@ -112,7 +112,7 @@ pub(crate) fn with_compiler<T>(
 /// [`LoadError`].
 fn load_in_unit(vm: &mut Vm, module: &Module) -> Result<Value, LoadError> {
     let mut unit = vm.compiler.unit.take();
-    let functions = load(&mut vm.heap, &mut vm.world, module, &mut unit);
+    let functions = load(&mut vm.heap, &mut vm.names, module, &mut unit);
     vm.compiler.unit.replace(unit);
     functions
 }
@@ -140,26 +140,26 @@ fn prepare(vm: &mut Vm, call: &MacroCall, unit: &mut Unit) -> Result<Option<[Val
     let function = match &call.function {
         MacroRef::Local(id) => unit.pinned(*id),
         MacroRef::Global(symbol) => {
-            let symbol = unit.symbol_object(&mut vm.heap, &mut vm.world, symbol)?;
-            vm.world.macro_function_of(&vm.heap, symbol)
+            let symbol = unit.symbol_object(&mut vm.heap, &mut vm.names, symbol)?;
+            vm.names.macro_function_of(&vm.heap, symbol)
         }
     };
     let Some(function) = function else { return Ok(None) };
-    let form = unit.value_of(&mut vm.heap, &mut vm.world, &call.form)?;
-    let environment = unit.environment(&mut vm.heap, &mut vm.world, &call.locals)?;
+    let form = unit.value_of(&mut vm.heap, &mut vm.names, &call.form)?;
+    let environment = unit.environment(&mut vm.heap, &mut vm.names, &call.locals)?;
     Ok(Some([function, form, environment]))
 }
 
 /// Returns the function that calls the functions of a list.
 fn runner(vm: &mut Vm) -> Result<Value, CallError> {
-    if vm.world.runner.is_nil() {
+    if vm.names.runner.is_nil() {
         // The module is the machine's own, so all it can lack is room.
         let toplevel = vm.load_module(&runner_module()).map_err(|_| CallError::NoMemory)?;
         let toplevel = vm.heap.car(toplevel).unwrap_or(Value::NIL);
         let runner = vm.call(toplevel, &[], LOAD_TICKS)?;
-        vm.world.runner = runner.first().copied().unwrap_or(Value::NIL);
+        vm.names.runner = runner.first().copied().unwrap_or(Value::NIL);
     }
-    Ok(vm.world.runner)
+    Ok(vm.names.runner)
 }
 
 /// Returns a module whose form returns a function that calls the functions of a list, and returns the value
@@ -248,7 +248,7 @@ impl CompileTimeHost for Vm {
         let expansion = values.first().copied().unwrap_or(Value::NIL);
         let datum_of = |vm: &Vm| {
             let mut unit = vm.compiler.unit.borrow_mut();
-            unit.datum_of(&vm.heap, &vm.world, expansion, call.form.span())
+            unit.datum_of(&vm.heap, &vm.names, expansion, call.form.span())
         };
         let mut datum = datum_of(self);
         if let Err(DatumError::NoRoom(_)) = datum {
@@ -277,8 +277,8 @@ impl Vm {
     /// Returns the library's text about the condition with which a macro has failed. There is none if it did
     /// not fail but was stopped, and none while the library is being built.
     fn expander_text(&mut self, condition: Value) -> Option<String> {
-        let writer = self.world.known.expander_text;
-        if condition.is_nil() || !self.world.is_defined(&self.heap, writer) {
+        let writer = self.names.known.expander_text;
+        if condition.is_nil() || !self.names.is_defined(&self.heap, writer) {
             return None;
         }
         self.embedder.pin(&mut self.heap, condition);
@@ -290,13 +290,13 @@ impl Vm {
     /// Returns how a call of a global macro is written, by the library. It is not known while the library is
     /// being built.
     fn usage_of(&mut self, function: &MacroRef) -> Option<String> {
-        let writer = self.world.known.macro_usage;
+        let writer = self.names.known.macro_usage;
         let MacroRef::Global(symbol) = function else { return None };
-        if !self.world.is_defined(&self.heap, writer) {
+        if !self.names.is_defined(&self.heap, writer) {
             return None;
         }
         let mut unit = self.compiler.unit.take();
-        let name = unit.symbol_object(&mut self.heap, &mut self.world, symbol);
+        let name = unit.symbol_object(&mut self.heap, &mut self.names, symbol);
         self.compiler.unit.replace(unit);
         let name = name.ok()?;
         let usage = self.call(writer, &[name], MACRO_TICKS);
@@ -316,6 +316,6 @@ impl Vm {
             }
         }
         let mut unit = self.compiler.unit.borrow_mut();
-        objects.into_iter().filter_map(|object| unit.origin_of(&self.heap, &self.world, object)).collect()
+        objects.into_iter().filter_map(|object| unit.origin_of(&self.heap, &self.names, object)).collect()
     }
 }

@@ -21,10 +21,10 @@ pub(crate) use host::{macro_call, with_compiler};
 
 use crate::heap::Heap;
 use crate::heap::layout::SymbolObject;
+use crate::names::{Names, find_builtin};
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::{World, find_builtin};
 
 mod host;
 mod package;
@@ -36,11 +36,11 @@ const MAX_FEATURES: usize = 1000;
 
 impl Environment for Vm {
     fn global(&self, symbol: &Symbol) -> Global {
-        let is_locked = symbol.package().is_some_and(|home| is_of_language(home)) && !self.world.is_open;
+        let is_locked = symbol.package().is_some_and(|home| is_of_language(home)) && !self.names.is_open;
         let Some(object) = object_for(self, symbol) else {
             return Global {
-                function: function_so_far(&self.world, symbol),
-                variable: variable_so_far(&self.world, symbol),
+                function: function_so_far(&self.names, symbol),
+                variable: variable_so_far(&self.names, symbol),
                 accessor: None,
                 locked: is_locked,
                 instead: instead_of(self, symbol),
@@ -66,15 +66,15 @@ impl Environment for Vm {
 
     fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum> {
         let Some(object) = object_for(self, symbol) else {
-            let (image, definition) = self.world.images.definition(symbol)?;
+            let (image, definition) = self.names.images.definition(symbol)?;
             let wanted = (&**indicator.package()?, indicator.name());
-            let has_name = |index| self.world.images.symbol(image, index) == Some(wanted);
+            let has_name = |index| self.names.images.symbol(image, index) == Some(wanted);
             let &(_, value) = definition.properties.iter().find(|&&(indicator, _)| has_name(indicator))?;
-            return self.world.images.datum(image, value);
+            return self.names.images.datum(image, value);
         };
         let value = property(&self.heap, object, value_for(self, indicator)?)?;
         let unit = &mut self.compiler.unit.borrow_mut();
-        Some(unit.datum_or_object(&self.heap, &self.world, value, Span::default()))
+        Some(unit.datum_or_object(&self.heap, &self.names, value, Span::default()))
     }
 
     fn intern(&mut self, package: Option<&str>, name: &str, internal: bool) -> Result<Symbol, InternError> {
@@ -82,19 +82,19 @@ impl Environment for Vm {
     }
 
     fn read_base(&self) -> u32 {
-        let base = self.symbol_value(self.world.known.read_base).and_then(Value::as_fixnum);
+        let base = self.symbol_value(self.names.known.read_base).and_then(Value::as_fixnum);
         base.and_then(|base| u32::try_from(base).ok()).filter(|base| (2..=36).contains(base)).unwrap_or(10)
     }
 
     fn has_own_syntax(&self) -> bool {
-        self.symbol_value(self.world.known.readtable).is_some_and(|readtable| !readtable.is_nil())
+        self.symbol_value(self.names.known.readtable).is_some_and(|readtable| !readtable.is_nil())
     }
 
     fn has_feature(&self, name: &str) -> Option<bool> {
-        let mut rest = self.symbol_value(self.world.known.features)?;
+        let mut rest = self.symbol_value(self.names.known.features)?;
         for _ in 0..MAX_FEATURES {
             let Some(pair) = self.heap.as_cons(rest) else { return Some(false) };
-            let feature = self.heap.symbol(self.world.object_of(&self.heap, pair.car).unwrap_or(pair.car));
+            let feature = self.heap.symbol(self.names.object_of(&self.heap, pair.car).unwrap_or(pair.car));
             if feature.is_some_and(|symbol| self.heap.string_text(symbol.name).as_deref() == Some(name)) {
                 return Some(true);
             }
@@ -108,7 +108,7 @@ impl Environment for Vm {
     }
 
     fn fresh(&mut self) -> u32 {
-        self.world.fresh()
+        self.names.fresh()
     }
 
     fn similar(&self, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol> {
@@ -125,13 +125,13 @@ fn is_of_language(home: &str) -> bool {
 }
 
 /// Returns the function that a symbol without an object names: a builtin, or one of the library.
-fn function_so_far(world: &World, symbol: &Symbol) -> GlobalFunction {
-    if let Some((image, definition)) = world.images.definition(symbol) {
+fn function_so_far(names: &Names, symbol: &Symbol) -> GlobalFunction {
+    if let Some((image, definition)) = names.images.definition(symbol) {
         if definition.macro_function.is_some() {
             return GlobalFunction::Macro;
         }
         if let Some(number) = definition.function {
-            let arity = world.images.decode(image, number).map(|function| arity_of(&function.parameters));
+            let arity = names.images.decode(image, number).map(|function| arity_of(&function.parameters));
             return GlobalFunction::Function(arity);
         }
     }
@@ -142,13 +142,13 @@ fn function_so_far(world: &World, symbol: &Symbol) -> GlobalFunction {
 }
 
 /// Returns the variable that such a symbol names.
-fn variable_so_far(world: &World, symbol: &Symbol) -> GlobalVariable {
+fn variable_so_far(names: &Names, symbol: &Symbol) -> GlobalVariable {
     if symbol.is_keyword() {
         return GlobalVariable::Constant(Datum::symbol(symbol.clone(), Span::default()));
     }
-    match world.images.definition(symbol) {
+    match names.images.definition(symbol) {
         Some((image, definition)) if definition.is_constant => {
-            match definition.value.and_then(|value| world.images.datum(image, value)) {
+            match definition.value.and_then(|value| names.images.datum(image, value)) {
                 Some(value) => GlobalVariable::Constant(value),
                 None => GlobalVariable::Special,
             }
@@ -180,12 +180,12 @@ pub(crate) fn property(heap: &Heap, object: Value, indicator: Value) -> Option<V
 /// Returns the symbol as the program sees it, if it has an object already.
 fn value_for(vm: &Vm, symbol: &Symbol) -> Option<Value> {
     match symbol.package() {
-        Some(_) => vm.world.find(symbol),
+        Some(_) => vm.names.find(symbol),
         None => {
             let unit = vm.compiler.unit.borrow();
             unit.find_uninterned(symbol).or_else(|| {
                 let named = unit.find_uninterned(&symbol_of_setf_cell(symbol)?)?;
-                vm.world.find_setf_cell(&vm.heap, named)
+                vm.names.find_setf_cell(&vm.heap, named)
             })
         }
     }
@@ -193,14 +193,14 @@ fn value_for(vm: &Vm, symbol: &Symbol) -> Option<Value> {
 
 /// Returns the object of a symbol, if there is one already.
 fn object_for(vm: &Vm, symbol: &Symbol) -> Option<Value> {
-    vm.world.object_of(&vm.heap, value_for(vm, symbol)?)
+    vm.names.object_of(&vm.heap, value_for(vm, symbol)?)
 }
 
 fn function_info(vm: &Vm, object: Value) -> GlobalFunction {
-    if vm.world.macro_function_of(&vm.heap, object).is_some() {
+    if vm.names.macro_function_of(&vm.heap, object).is_some() {
         return GlobalFunction::Macro;
     }
-    match vm.world.function_of(&vm.heap, object) {
+    match vm.names.function_of(&vm.heap, object) {
         Some(function) => GlobalFunction::Function(arity(vm, function)),
         None => GlobalFunction::Undefined,
     }
@@ -214,8 +214,8 @@ pub(crate) fn arity(vm: &Vm, function: Value) -> Option<Arity> {
         Sort::Native => BUILTINS.get(usize::from(shape.number)).map(|info| info.arity),
         Sort::Undefined => None,
         Sort::Lazy => {
-            let (image, number) = crate::world::load::image_origin(&vm.heap, function)?;
-            Some(arity_of(&vm.world.images.decode(image, number)?.parameters))
+            let (image, number) = crate::names::load::image_origin(&vm.heap, function)?;
+            Some(arity_of(&vm.names.images.decode(image, number)?.parameters))
         }
         Sort::Bytecode => {
             let min = u32::from(shape.required);
@@ -229,7 +229,7 @@ fn variable_info(vm: &Vm, object: Value) -> GlobalVariable {
     let Some(cell) = vm.heap.symbol(object) else { return GlobalVariable::Undefined };
     if cell.header.flags & SymbolObject::CONSTANT != 0 {
         let unit = &mut vm.compiler.unit.borrow_mut();
-        let value = unit.datum_or_object(&vm.heap, &vm.world, cell.value, Span::default());
+        let value = unit.datum_or_object(&vm.heap, &vm.names, cell.value, Span::default());
         return GlobalVariable::Constant(value);
     }
     if cell.header.flags & SymbolObject::SPECIAL != 0 {
@@ -241,11 +241,11 @@ fn variable_info(vm: &Vm, object: Value) -> GlobalVariable {
 
 /// Returns the record of `%define-accessor`.
 fn accessor_info(vm: &Vm, object: Value) -> Option<Accessor> {
-    let record = property(&vm.heap, object, vm.world.known.accessor)?;
+    let record = property(&vm.heap, object, vm.names.known.accessor)?;
     let class = vm.heap.as_cons(record)?;
     let slot = vm.heap.as_cons(class.cdr)?;
     Some(Accessor {
-        class: vm.world.name_of(&vm.heap, class.car)?,
+        class: vm.names.name_of(&vm.heap, class.car)?,
         slot: u16::try_from(slot.car.as_index()?).ok()?,
         read_only: slot.cdr.is_true(),
     })

@@ -11,13 +11,13 @@ impl Vm {
     /// Returns the current package: the value of `*package*` in the running task. If that is not a package,
     /// it is `ESL-USER`.
     pub(crate) fn current_package(&self) -> PackageId {
-        let value = self.symbol_value(self.world.known.package);
-        value.and_then(|value| self.world.package_of(&self.heap, value)).unwrap_or(PackageId::USER)
+        let value = self.symbol_value(self.names.known.package);
+        value.and_then(|value| self.names.package_of(&self.heap, value)).unwrap_or(PackageId::USER)
     }
 
     /// Returns the names of all symbols that can be written in the current package without a prefix, sorted.
     pub fn accessible_names(&self) -> Vec<String> {
-        let names = self.world.packages().accessible_names(self.current_package());
+        let names = self.names.packages().accessible_names(self.current_package());
         names.into_iter().filter(|name| !name.starts_with('%')).map(String::from).collect()
     }
 
@@ -27,9 +27,9 @@ impl Vm {
     /// # Errors
     /// [`AllocError`] without room.
     pub fn enter_package(&mut self, name: &str) -> Result<bool, AllocError> {
-        let Some(package) = self.world.packages().named(name) else { return Ok(false) };
-        let object = self.world.package_object(&mut self.heap, package)?;
-        self.heap.symbol_set_value(self.world.known.package, object);
+        let Some(package) = self.names.packages().named(name) else { return Ok(false) };
+        let object = self.names.package_object(&mut self.heap, package)?;
+        self.heap.symbol_set_value(self.names.known.package, object);
         Ok(true)
     }
 
@@ -41,6 +41,6 @@ impl Vm {
         internal: bool,
     ) -> Result<Symbol, InternError> {
         let current = self.current_package();
-        self.world.packages_mut().read(current, prefix, name, internal)
+        self.names.packages_mut().read(current, prefix, name, internal)
     }
 }

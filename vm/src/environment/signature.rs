@@ -8,16 +8,16 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::object_for;
+use crate::names::find_builtin;
+use crate::names::load::{debug_texts, image_origin};
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::find_builtin;
-use crate::world::load::{debug_texts, image_origin};
 
 /// Returns the parameters of the function or macro that `cell` keeps.
 pub(super) fn signature(vm: &Vm, cell: &Symbol) -> Option<Signature> {
     let Some(object) = object_for(vm, cell) else {
-        let definition = vm.world.images.definition(cell);
+        let definition = vm.names.images.definition(cell);
         let function = definition.and_then(|(image, definition)| {
             Some((image, definition.macro_function.or(definition.function)?))
         });
@@ -26,8 +26,8 @@ pub(super) fn signature(vm: &Vm, cell: &Symbol) -> Option<Signature> {
             None => Some(of_builtin(find_builtin(cell)?.info())),
         };
     };
-    let macro_function = vm.world.macro_function_of(&vm.heap, object);
-    of_function(vm, macro_function.or_else(|| vm.world.function_of(&vm.heap, object))?)
+    let macro_function = vm.names.macro_function_of(&vm.heap, object);
+    of_function(vm, macro_function.or_else(|| vm.names.function_of(&vm.heap, object))?)
 }
 
 fn of_function(vm: &Vm, function: Value) -> Option<Signature> {
@@ -42,7 +42,7 @@ fn of_function(vm: &Vm, function: Value) -> Option<Signature> {
         Sort::Bytecode => {
             let (lambda_list, _) = debug_texts(&vm.heap, code.debug)?;
             let unit = &mut vm.compiler.unit.borrow_mut();
-            let lambda_list = unit.datum_or_object(&vm.heap, &vm.world, lambda_list, Span::default());
+            let lambda_list = unit.datum_or_object(&vm.heap, &vm.names, lambda_list, Span::default());
             let keys = (shape.takes_keys && !shape.allow_other_keys).then(|| keys_in(&lambda_list));
             let positional = u32::from(shape.required) + u32::from(shape.optional);
             Some(Signature { lambda_list, positional, keys })
@@ -51,8 +51,8 @@ fn of_function(vm: &Vm, function: Value) -> Option<Signature> {
 }
 
 fn of_image(vm: &Vm, image: usize, number: u32) -> Option<Signature> {
-    let ModuleFunction { parameters, lambda_list, .. } = vm.world.images.decode(image, number)?;
-    let lambda_list = lambda_list.and_then(|index| vm.world.images.datum(image, index));
+    let ModuleFunction { parameters, lambda_list, .. } = vm.names.images.decode(image, number)?;
+    let lambda_list = lambda_list.and_then(|index| vm.names.images.datum(image, index));
     let lambda_list = lambda_list.unwrap_or_else(|| Datum::nil(Span::default()));
     let keys = (parameters.keys.is_some() && !parameters.allow_other_keys).then(|| keys_in(&lambda_list));
     let positional = u32::from(parameters.required) + u32::from(parameters.optional);

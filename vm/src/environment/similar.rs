@@ -20,10 +20,10 @@ pub(super) fn similar(vm: &Vm, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol> 
         6..=9 => 2,
         _ => 3,
     };
-    let home = symbol.package().and_then(|name| vm.world.packages.named(name)).unwrap_or(PackageId::USER);
+    let home = symbol.package().and_then(|name| vm.names.packages.named(name)).unwrap_or(PackageId::USER);
     let is_accessible = |candidate: &Symbol| {
         candidate.package() == symbol.package()
-            || !matches!(vm.world.packages.qualifier(candidate, home), Qualifier::Internal(_))
+            || !matches!(vm.names.packages.qualifier(candidate, home), Qualifier::Internal(_))
     };
     let mut found: Vec<(usize, Symbol)> = Vec::new();
     let mut consider = |candidate: &Symbol| {
@@ -39,7 +39,7 @@ pub(super) fn similar(vm: &Vm, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol> 
             }
         }
     };
-    vm.world.each_symbol(&mut |candidate, value| {
+    vm.names.each_symbol(&mut |candidate, value| {
         let is_likely = wanted == NameUse::Cause || is_visible(candidate, symbol);
         if is_likely && is_defined(vm, value, wanted) {
             consider(candidate);
@@ -49,7 +49,7 @@ pub(super) fn similar(vm: &Vm, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol> 
         for info in BUILTINS {
             consider(&Symbol::new(&info.package().into(), info.name));
         }
-        vm.world.images.each_definition(&mut consider);
+        vm.names.images.each_definition(&mut consider);
     }
     // At equal distance, the program's own names come first, then in alphabetical order.
     found.sort_by_key(|(distance, candidate)| {
@@ -69,11 +69,11 @@ fn is_visible(candidate: &Symbol, symbol: &Symbol) -> bool {
 }
 
 fn is_defined(vm: &Vm, value: Value, wanted: NameUse) -> bool {
-    let Some(object) = vm.world.object_of(&vm.heap, value) else { return false };
+    let Some(object) = vm.names.object_of(&vm.heap, value) else { return false };
     match wanted {
         NameUse::Function => {
-            vm.world.function_of(&vm.heap, object).is_some()
-                || vm.world.macro_function_of(&vm.heap, object).is_some()
+            vm.names.function_of(&vm.heap, object).is_some()
+                || vm.names.macro_function_of(&vm.heap, object).is_some()
         }
         NameUse::Variable => {
             let flags = vm.heap.symbol(object).map_or(0, |cell| cell.header.flags);

@@ -11,7 +11,7 @@ use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, Poo
 
 use super::*;
 use crate::datum::Unit;
-use crate::world::load::prepare;
+use crate::names::load::prepare;
 
 fn span() -> Span {
     Span::default()
@@ -111,7 +111,7 @@ fn a_compiler_learns_what_names_mean() {
         assert_eq!(vm.similar(&foreign, NameUse::Function), [], "a program cannot use an internal name");
         assert_eq!(
             vm.similar(&Symbol::esl("LIMITS"), NameUse::Variable).len(),
-            usize::from(vm.world.find(&Symbol::esl("LIMIT")).is_some())
+            usize::from(vm.names.find(&Symbol::esl("LIMIT")).is_some())
         );
     }
 }
@@ -125,9 +125,9 @@ fn accessors_are_known_until_they_are_redefined() {
     load(&mut vm, &call(Builtin::DefineAccessor, define));
     let expected = Accessor { class: Symbol::esl("POINT"), slot: 1, read_only: false };
     assert_eq!(vm.global(&Symbol::esl("POINT-Y")).accessor, Some(expected));
-    let name = vm.world.intern_esl(&mut vm.heap, "POINT-Y").unwrap();
-    let car = vm.world.intern_cl(&mut vm.heap, "CAR").unwrap();
-    let function = vm.world.function_of(&vm.heap, car).unwrap();
+    let name = vm.names.intern_esl(&mut vm.heap, "POINT-Y").unwrap();
+    let car = vm.names.intern_cl(&mut vm.heap, "CAR").unwrap();
+    let function = vm.names.function_of(&vm.heap, car).unwrap();
     crate::builtins::NATIVES[Builtin::SetFunction as usize](&mut vm, &[name, function]).unwrap();
     assert_eq!(vm.global(&Symbol::esl("POINT-Y")).accessor, None);
 }
@@ -158,7 +158,7 @@ fn environments_share_what_they_have_in_common() {
     let outer = Locals::default().with(Symbol::esl("F"), LocalMeaning::Function);
     let inner = outer.with(Symbol::esl("G"), LocalMeaning::Function);
     let beside = outer.with(Symbol::esl("H"), LocalMeaning::Variable);
-    let mut made = |locals: &Locals| unit.environment(&mut vm.heap, &mut vm.world, locals).unwrap();
+    let mut made = |locals: &Locals| unit.environment(&mut vm.heap, &mut vm.names, locals).unwrap();
     let (first, second, third, again) = (made(&inner), made(&beside), made(&outer), made(&inner));
     assert_eq!(made(&inner), again);
     assert_eq!(made(&Locals::default()), Value::NIL);
@@ -258,7 +258,7 @@ fn native(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Vec<Value> {
 }
 
 fn keyword(vm: &mut Vm, name: &str) -> Value {
-    vm.world.keyword(&mut vm.heap, name).unwrap()
+    vm.names.keyword(&mut vm.heap, name).unwrap()
 }
 
 #[test]
@@ -273,7 +273,7 @@ fn a_program_steps_a_compilation() {
         (keyword(&mut vm, "START"), keyword(&mut vm, "EXPAND"), keyword(&mut vm, "EXPANSION"));
     let done = keyword(&mut vm, "DONE");
     let begin = |vm: &mut Vm| {
-        let name = vm.world.intern_esl(&mut vm.heap, "QUOTED").unwrap();
+        let name = vm.names.intern_esl(&mut vm.heap, "QUOTED").unwrap();
         let form = vm.heap.list(&[name]).unwrap();
         native(vm, Builtin::BeginCompilation, &[form])[0]
     };

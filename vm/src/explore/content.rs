@@ -6,26 +6,26 @@ use crate::compiler::Compilations;
 use crate::heap::Heap;
 use crate::heap::layout::SymbolObject;
 use crate::interp::frames::entry_word;
+use crate::names::Names;
 use crate::outside::Outside;
 use crate::schedule::{Due, Scheduler};
 use crate::shape::{Shape, Sort};
 use crate::state::{
-    VisitCompiler, VisitControl, VisitCourse, VisitExtra, VisitOutside, VisitRunning, VisitScheduler,
-    VisitTask, VisitVm, VisitWorld,
+    VisitCompiler, VisitControl, VisitCourse, VisitExtra, VisitNames, VisitOutside, VisitRunning,
+    VisitScheduler, VisitTask, VisitVm,
 };
 use crate::task::{Allowance, Control, Entry, Extra, RunningCleanup, Task, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
-use crate::world::World;
 
 impl VisitVm for Walk<'_> {
     fn scheduler(&mut self, vm: &Vm) {
         self.scheduler_content(&vm.scheduler);
     }
 
-    fn world(&mut self, vm: &Vm) {
-        self.world_content(&vm.world);
+    fn names(&mut self, vm: &Vm) {
+        self.names_content(&vm.names);
     }
 
     fn database(&mut self, vm: &Vm) {
@@ -225,9 +225,9 @@ impl VisitRunning for Walk<'_> {
     }
 }
 
-impl VisitWorld for Walk<'_> {
+impl VisitNames for Walk<'_> {
     /// Values, functions and properties that the program has given to symbols of packages.
-    fn symbols(&mut self, _: &World) {
+    fn symbols(&mut self, _: &Names) {
         let vm = self.vm;
         for &NamedSymbol { digest, object: v, function, .. } in &*self.named() {
             let Some(object) = vm.heap.symbol(v) else { continue };

@@ -30,6 +30,8 @@ use esl_host::machine::CopyOnWrite;
 use crate::fused::unfused;
 use crate::heap::{Heap, Kind};
 use crate::interp::frames::Frames;
+use crate::names::load::image_origin;
+use crate::names::{GivenMap, Names};
 use crate::schedule::Grain;
 use crate::shape::{Shape, Sort};
 use crate::state::{VisitCourse, VisitVm};
@@ -38,8 +40,6 @@ use crate::task::{Task, TaskEnd, UnwindTarget, Unwinding};
 use crate::value::{TAG_MASK, TAG_OBJECT, Value};
 use crate::vm::Vm;
 use crate::wait::{event, link};
-use crate::world::load::image_origin;
-use crate::world::{GivenMap, World};
 
 /// A symbol of a package, and what tells it from others.
 #[derive(Clone)]
@@ -74,13 +74,13 @@ pub(super) struct Fingerprints {
 }
 
 impl NamedSymbol {
-    fn of(heap: &Heap, world: &World, symbol: &Symbol, object: Value) -> NamedSymbol {
+    fn of(heap: &Heap, names: &Names, symbol: &Symbol, object: Value) -> NamedSymbol {
         let cells = heap.symbol(object);
         let function = cells.map(|cells| cells.function);
         let function = function.filter(|&function| !is_of_program(heap, function)).unwrap_or(Value::NIL);
         let documentation = cells
             .filter(|cells| cells.plist.is_true())
-            .and_then(|_| world.images.text_of(heap, symbol))
+            .and_then(|_| names.images.text_of(heap, symbol))
             .unwrap_or(Value::NIL);
         NamedSymbol {
             symbol: symbol.clone(),
@@ -124,9 +124,9 @@ impl Fingerprints {
     }
 
     /// Takes note of the symbols that the machine has got since.
-    fn note_symbols(&mut self, heap: &Heap, world: &World) {
+    fn note_symbols(&mut self, heap: &Heap, names: &Names) {
         // A machine gets more symbols, and loses none.
-        if self.named_of == world.symbols.len() {
+        if self.named_of == names.symbols.len() {
             return;
         }
         self.numbers.begin();
@@ -135,9 +135,9 @@ impl Fingerprints {
         }
         let numbers = &mut self.numbers;
         let mut is_new = |object: Value| object.is_address() && numbers.of(object, 1) == 1;
-        let new = world.symbols.iter().filter(|&(_, &object)| is_new(object));
+        let new = names.symbols.iter().filter(|&(_, &object)| is_new(object));
         let mut new: Vec<NamedSymbol> =
-            new.map(|(symbol, &object)| NamedSymbol::of(heap, world, symbol, object)).collect();
+            new.map(|(symbol, &object)| NamedSymbol::of(heap, names, symbol, object)).collect();
         new.sort_unstable_by(|a, b| a.name().cmp(&b.name()));
         let mut all = Vec::with_capacity(self.named.len() + new.len());
         let mut old = self.named.iter().peekable();
@@ -148,7 +148,7 @@ impl Fingerprints {
             all.push(symbol);
         }
         all.extend(old.cloned());
-        (self.named, self.named_of) = (Rc::new(all), world.symbols.len());
+        (self.named, self.named_of) = (Rc::new(all), names.symbols.len());
     }
 
     /// Gives the documentation of the library numbers that follow from the names of its symbols. It need not
@@ -172,7 +172,7 @@ impl Fingerprints {
     }
 
     fn walk(&mut self, vm: &Vm, now: u64, is_strict: bool) -> u128 {
-        self.note_symbols(&vm.heap, &vm.world);
+        self.note_symbols(&vm.heap, &vm.names);
         self.numbers.begin();
         if !is_strict {
             self.number_documentation();
@@ -407,7 +407,7 @@ impl Walk<'_> {
             Kind::Task => {
                 let slots = vm.heap.record(v, Kind::Task).unwrap_or_default().to_vec();
                 let is_alive = slots[event::STATE].is_fixnum();
-                let has_failed = slots[event::STATE] == vm.world.known.failed;
+                let has_failed = slots[event::STATE] == vm.names.known.failed;
                 for (index, mut v) in slots.into_iter().enumerate() {
                     if has_failed && index == event::RESULT && !self.is_strict {
                         // Where it has failed makes no difference.
@@ -452,9 +452,9 @@ impl Walk<'_> {
         if let Some(&digest) = self.known.codes.get(&v.bits()) {
             return Some(digest);
         }
-        let symbol = self.vm.world.name_of(&self.vm.heap, v)?;
+        let symbol = self.vm.names.name_of(&self.vm.heap, v)?;
         let digest = Digest::of_symbol(&symbol);
-        if self.vm.world.symbols.contains_key(&symbol) {
+        if self.vm.names.symbols.contains_key(&symbol) {
             self.known.codes.insert(v.bits(), digest);
         }
         Some(digest)

@@ -90,9 +90,9 @@ fn follow(
         if let Some(told) = &mut told {
             tell_uses(vm, *told);
             // Uses of variables are told at each grain.
-            if watched != vm.world.symbol_count() {
+            if watched != vm.names.symbol_count() {
                 watch_variables(vm);
-                watched = vm.world.symbol_count();
+                watched = vm.names.symbol_count();
             }
         }
         if !goes_beyond && choices.len() == 0 {
@@ -160,7 +160,7 @@ pub(super) type Choose<'a> = dyn FnMut(&mut Vm, PointRun, Runnable<'_>) -> Optio
 impl PointRun {
     /// Begins to run a program from its beginning.
     pub(super) fn begin(vm: &mut Vm, settings: &Settings) -> PointRun {
-        let checks = vm.world.intern_esl(&mut vm.heap, "*%EXPLORED-STATE*").unwrap_or(Value::NIL);
+        let checks = vm.names.intern_esl(&mut vm.heap, "*%EXPLORED-STATE*").unwrap_or(Value::NIL);
         PointRun {
             last: TaskNumber(u64::MAX),
             checks,
@@ -249,7 +249,7 @@ impl PointRun {
     /// it since its last point, giving way here would be as giving way there.
     fn goes_on_unseen(&mut self, vm: &mut Vm) -> Option<TaskIndex> {
         let way = self.unseen.as_mut()?;
-        let symbols = vm.world.symbol_count();
+        let symbols = vm.names.symbol_count();
         if way.watched != symbols {
             watch_variables(vm);
             way.watched = symbols;
@@ -287,7 +287,7 @@ impl PointRun {
 /// protects them.
 fn watch_variables(vm: &mut Vm) {
     let mut watched = Vec::new();
-    vm.world.each_symbol(&mut |symbol, object| {
+    vm.names.each_symbol(&mut |symbol, object| {
         if !is_of_library(symbol)
             && vm.heap.symbol(object).is_some_and(|cell| cell.header.flags & NOT_WATCHED == 0)
         {

@@ -117,7 +117,7 @@ pub(super) fn tell_uses(vm: &mut Vm, told: &mut TellStep<'_>) {
         return;
     }
     let mut is_of_program = vec![false; uses.len()];
-    vm.world.each_symbol(&mut |symbol, object| {
+    vm.names.each_symbol(&mut |symbol, object| {
         for (used, is_of_program) in uses.iter().zip(&mut is_of_program) {
             // Names that begin with `%` are those of the library's machinery, such as the object of a fluent.
             *is_of_program |=

@@ -12,11 +12,11 @@ use esl_bytecode::symbol::Symbol;
 use super::fingerprint::Fingerprints;
 use super::live::Live;
 use super::{Exploration, SearchLimit, Settings, explore};
+use crate::names::load::{Alone, load};
 use crate::run::RunOutcome;
 use crate::schedule::Choices;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::load::{Alone, load};
 
 fn words(code: &[Instr]) -> Vec<u32> {
     code.iter()
@@ -41,7 +41,7 @@ fn machine(tasks: &[&[Instr]]) -> Vm {
             toplevel: vec![FunctionNumber(0)],
             ..Module::default()
         };
-        let list = load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default());
+        let list = load(&mut vm.heap, &mut vm.names, &module, &mut Alone::default());
         let main = vm.heap.car(list.expect("the module is in order")).expect("one top-level function");
         vm.spawn(main, &[]).expect("there is room");
     }
@@ -61,7 +61,7 @@ fn call(builtin: Builtin, count: u8) -> Instr {
 fn endings(tasks: &[&[Instr]], settings: &Settings) -> Exploration<(RunOutcome, String)> {
     let begin = || Ok::<Vm, Infallible>(machine(tasks));
     let judge = |vm: &mut Vm, outcome| {
-        let symbol = vm.world.find(&Symbol::esl("F")).unwrap_or(Value::NIL);
+        let symbol = vm.names.find(&Symbol::esl("F")).unwrap_or(Value::NIL);
         let value = vm.symbol_value(symbol).map_or("unbound".into(), |value| vm.describe(value));
         (outcome, value)
     };
@@ -99,7 +99,7 @@ fn all_orders_are_found() {
     for ending in &found.endings {
         let mut vm = machine(&[&first, &second]);
         assert_eq!(vm.follow(&Settings::default(), &ending.choices), RunOutcome::Done);
-        let symbol = vm.world.find(&Symbol::esl("F")).unwrap();
+        let symbol = vm.names.find(&Symbol::esl("F")).unwrap();
         assert_eq!(vm.describe(vm.symbol_value(symbol).unwrap()), ending.what.1);
     }
 }
@@ -132,7 +132,7 @@ fn a_fingerprint_depends_on_the_state_alone() {
     let mut fingerprints = Fingerprints::default();
     let mut of = |prepare: &dyn Fn(&mut Vm, Value)| {
         let mut vm = machine(&[&[Instr::ReturnValues { first: Items(0), count: Count(0) }]]);
-        let symbol = vm.world.find(&Symbol::esl("F")).unwrap();
+        let symbol = vm.names.find(&Symbol::esl("F")).unwrap();
         prepare(&mut vm, symbol);
         fingerprints.begin_machine();
         fingerprints.of(&mut vm)

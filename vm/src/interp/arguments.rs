@@ -91,7 +91,7 @@ fn take_keys(
         return vm.exchange.program_error(format!("{name} was called with an odd number of key arguments"));
     }
     vm.exchange.charge(rest.len() * (1 + names.len() / 8));
-    let allow_other_keys = vm.world.known.allow_other_keys;
+    let allow_other_keys = vm.names.known.allow_other_keys;
     let mut unknown = None;
     let mut allows = None;
     for pair in rest.chunks_exact(2) {

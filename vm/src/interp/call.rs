@@ -312,7 +312,7 @@ impl Vm {
     /// # Errors
     /// [`Exit::Collect`] without room, or a failure if the image is damaged.
     pub(crate) fn make_ready(&mut self, function: Value) -> Result<(), Exit> {
-        let words = self.world.make_ready(&mut self.heap, function);
+        let words = self.names.make_ready(&mut self.heap, function);
         let words = self.exchange.loaded(words)?;
         self.exchange.charge(words);
         Ok(())
@@ -324,8 +324,8 @@ impl Vm {
     /// `program-error` if there is none, [`Exit::Collect`] without room for its name.
     pub(super) fn twin_of(&mut self, builtin: &BuiltinInfo) -> Result<Value, Exit> {
         if let Some(name) = builtin.slowly {
-            let symbol = self.world.intern_esl(&mut self.heap, name)?;
-            if self.world.is_defined(&self.heap, symbol) {
+            let symbol = self.names.intern_esl(&mut self.heap, name)?;
+            if self.names.is_defined(&self.heap, symbol) {
                 return Ok(symbol);
             }
         }

@@ -12,13 +12,13 @@ use esl_bytecode::operand::Role;
 use super::arguments::MAX_SPREAD;
 use super::{Signal, aux_at, code_of, constant, constants_of, failure, word_at};
 use crate::heap::layout::{CodeObject, FunctionObject, Kind};
+use crate::names::class;
 use crate::number;
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::shape::capture_source;
 use crate::types;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::class;
 
 /// Puts an outcome into register `dst`.
 ///
@@ -252,7 +252,7 @@ pub(super) unsafe fn set_slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> 
 /// Fails unless `instance` is one of the class, or of a subclass, and has that slot.
 fn expect_slot(vm: &mut Vm, instance: Value, slot: usize, class: Value) -> Result<(), Signal> {
     let has_slot = vm.heap.structure_slots(instance).is_some_and(|slots| slot < slots.len());
-    if has_slot && vm.world.is_instance(&vm.heap, instance, class) {
+    if has_slot && vm.names.is_instance(&vm.heap, instance, class) {
         return Ok(());
     }
     let expected = Expected::Specifier(class::name_of(&vm.heap, class));
@@ -268,7 +268,7 @@ fn expect_slot(vm: &mut Vm, instance: Value, slot: usize, class: Value) -> Resul
 pub(super) unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, index: usize) -> bool {
     // SAFETY: by the contract the frame at `base` runs, and the constant is for a class.
     let class = unsafe { class_constant(vm, base, index) };
-    vm.world.is_instance(&vm.heap, value, class)
+    vm.names.is_instance(&vm.heap, value, class)
 }
 
 /// Returns the class that is a constant of the running function. As loaded the constant is the name of the
@@ -284,7 +284,7 @@ unsafe fn class_constant(vm: &mut Vm, base: *mut Value, index: usize) -> Value {
         let constant = constants_of(code_of(*base.sub(2))).add(index).cast_mut();
         let name =
             if vm.heap.is(*constant, Kind::Class) { class::name_of(&vm.heap, *constant) } else { *constant };
-        if let Some(class) = vm.world.find_class(name)
+        if let Some(class) = vm.names.find_class(name)
             && class != *constant
         {
             vm.heap.store(constant, class);

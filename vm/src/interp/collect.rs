@@ -13,6 +13,7 @@ use crate::compiler::Compilations;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
+use crate::names::{Names, Opaques};
 use crate::outside::Outside;
 use crate::saved_pc::SavedPc;
 use crate::schedule::{Scheduler, TurnEnd};
@@ -21,7 +22,6 @@ use crate::task::{Control, Task, Tasks};
 use crate::tier::CompiledFunctions;
 use crate::vm::Vm;
 use crate::wait::Deliveries;
-use crate::world::{Opaques, World};
 
 /// Offset of the first word above the frame with the given base.
 ///
@@ -150,14 +150,14 @@ fn is_large(task: &Task) -> bool {
 /// Marks everything that is reachable without a task.
 fn mark_roots(
     heap: &mut Heap,
-    world: &World,
+    names: &Names,
     compiler: &Compilations,
     exchange: &Exchange,
     embedder: &Embedder,
     deliveries: &Deliveries,
     outside: &Outside,
 ) {
-    world.roots(&mut |value| heap.mark(value));
+    names.roots(&mut |value| heap.mark(value));
     compiler.roots(&mut |value| heap.mark(value));
     heap.mark_slice(&exchange.values);
     heap.mark_slice(&exchange.requested_call);
@@ -304,17 +304,17 @@ impl Vm {
     /// Completes a whole cycle: for want of room, or since each safepoint is to collect.
     pub(crate) fn collect_fully(&mut self) {
         let pause = self.begin_pause();
-        let Vm { heap, world, compiler, scheduler, outside, exchange, embedder, .. } = self;
+        let Vm { heap, names, compiler, scheduler, outside, exchange, embedder, .. } = self;
         #[cfg(feature = "native")]
         let compiled = &mut self.compiled;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
         // SAFETY: all roots and all tasks are marked; `begin_pause` has noted the running frame of the
         // running task, those of the others were noted at the switch.
         unsafe {
-            let mut opaques = std::mem::take(&mut world.opaques);
+            let mut opaques = std::mem::take(&mut names.opaques);
             heap.collect_fully_and_tell(
                 |heap| {
-                    mark_roots(heap, world, compiler, exchange, embedder, deliveries, outside);
+                    mark_roots(heap, names, compiler, exchange, embedder, deliveries, outside);
                     for task in tasks.iter_mut() {
                         trim(heap, task);
                     }
@@ -332,10 +332,10 @@ impl Vm {
                     Vm::give_back_code(compiled, heap);
                 },
             );
-            world.opaques = opaques;
+            names.opaques = opaques;
         }
         self.end_pause(pause);
-        self.world.opaques.let_go();
+        self.names.opaques.let_go();
     }
 
     /// Gives back most of the stack of the running task if it is much too large for what is on it.
@@ -362,7 +362,7 @@ impl Vm {
     /// The collector's turn.
     pub(crate) fn collect_slice(&mut self) {
         let pause = self.begin_pause();
-        let Vm { heap, world, compiler, scheduler, outside, exchange, embedder, .. } = self;
+        let Vm { heap, names, compiler, scheduler, outside, exchange, embedder, .. } = self;
         #[cfg(feature = "native")]
         let compiled = &mut self.compiled;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
@@ -370,7 +370,7 @@ impl Vm {
             Phase::Marking => mark_more(
                 heap,
                 tasks,
-                &mut world.opaques,
+                &mut names.opaques,
                 #[cfg(feature = "native")]
                 compiled,
             ),
@@ -378,7 +378,7 @@ impl Vm {
             Phase::Idle => {
                 heap.begin_cycle();
                 tasks.begin_cycle();
-                mark_roots(heap, world, compiler, exchange, embedder, deliveries, outside);
+                mark_roots(heap, names, compiler, exchange, embedder, deliveries, outside);
                 // A large one leaves its slice, and is scanned before the next.
                 if let Some(task) = running
                     && !is_large(task)
@@ -389,7 +389,7 @@ impl Vm {
             }
         }
         self.end_pause(pause);
-        self.world.opaques.let_go();
+        self.names.opaques.let_go();
     }
 
     /// Begins a turn of the collector: notes where the running task stands, and tells whoever watches.

@@ -23,7 +23,7 @@ pub(super) fn end_task(vm: &mut Vm) -> Result<(), Leave> {
     }
     put_off_end(vm);
     vm.heap.slot_set(vm.scheduler.task().object, event::HELD, Value::NIL);
-    start::begin_again(vm, vm.world.known.release_held, held);
+    start::begin_again(vm, vm.names.known.release_held, held);
     Ok(())
 }
 

@@ -68,13 +68,13 @@ unsafe fn take_over(vm: &mut Vm) -> Signal {
 unsafe fn raise(vm: &mut Vm) -> Signal {
     // It stays noted until it has been put into words, since that may have to be done again.
     let raised = vm.exchange.raised.clone().unwrap_or(Raised::Simple("an operation failed".into()));
-    let arguments = match raised.arguments(&mut vm.heap, &mut vm.world) {
+    let arguments = match raised.arguments(&mut vm.heap, &mut vm.names) {
         Ok(arguments) => arguments,
         Err(error) => return Signal::Exit(error.into()),
     };
     vm.exchange.raised = None;
-    let function = vm.world.known.raise;
-    if !vm.world.is_defined(&vm.heap, function) {
+    let function = vm.names.known.raise;
+    if !vm.names.is_defined(&vm.heap, function) {
         // Without a library nobody can handle it.
         let words: Vec<String> = arguments.iter().map(|&v| describe(&vm.heap, v)).collect();
         vm.embedder.last_words = Some(words.join(" "));
@@ -147,7 +147,7 @@ fn run_out(vm: &mut Vm, is_call: bool, has_collected: bool) -> Signal {
         vm.cpu.ticks -= 1;
     }
     if !vm.heap.open_reserve() {
-        vm.leave_reserve(vm.world.known.heap_exhausted);
+        vm.leave_reserve(vm.names.known.heap_exhausted);
         return Signal::Unwind;
     }
     if has_collected {

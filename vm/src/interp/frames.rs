@@ -6,11 +6,11 @@ use std::marker::PhantomData;
 use super::{code_of, pc_from_value, stubs, word_at};
 use crate::heap::Heap;
 use crate::heap::layout::CodeObject;
+use crate::names::load::is_of_library;
 use crate::task::Entry;
 use crate::task::Task;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::load::is_of_library;
 use esl_bytecode::module::VariablePlace;
 use esl_bytecode::opcode::{CallTarget, Opcode};
 

@@ -28,7 +28,7 @@ pub(super) unsafe fn interrupt(
     let entry = Entry { data: wait, pc: SavedPc::NONE, base, bindings, window: 0, want: 0, kind };
     task.control.entries.push(entry);
     if let Some(value) = lent {
-        task.control.bindings.push(Binding { symbol: vm.world.rights, value, base });
+        task.control.bindings.push(Binding { symbol: vm.names.rights, value, base });
     }
     // SAFETY: F1 holds by the contract, and a frame above the running one needs no window.
     unsafe { call(vm, function, arguments, FramePlace::Interrupt) }

@@ -53,7 +53,7 @@ impl Vm {
     pub(super) fn reserve_stack(&mut self, words: usize) -> Result<(), Exit> {
         if words > stack_limit(&self.config, self.scheduler.task()) {
             if self.scheduler.task().flags.uses_reserve() {
-                self.leave_reserve(self.world.known.stack_exhausted);
+                self.leave_reserve(self.names.known.stack_exhausted);
                 return Err(Exit::Unwind);
             }
             self.scheduler.task_mut().flags.set_uses_reserve(true);
@@ -178,7 +178,7 @@ impl Vm {
     /// task ends with `cause`.
     pub(crate) fn leave_reserve(&mut self, cause: Value) {
         let control = &self.scheduler.task().control;
-        let (found, height) = (control.find_catch(self.world.known.reserve), control.entries.len());
+        let (found, height) = (control.find_catch(self.names.known.reserve), control.entries.len());
         self.exchange.charge(height - found.unwrap_or(0));
         match found {
             Some(index) => {

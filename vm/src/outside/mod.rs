@@ -1,7 +1,7 @@
 //! The outside of a machine: its host, the standard streams, the embedder's functions, and the operations
 //! that these have begun.
 
-mod operations;
+mod under_way;
 
 use std::collections::BTreeMap;
 use std::hash::{BuildHasherDefault, DefaultHasher};
@@ -14,7 +14,7 @@ use indexmap::IndexMap;
 
 use crate::task::TaskNumber;
 use crate::value::Value;
-pub(crate) use operations::Operations;
+pub(crate) use under_way::Operations;
 
 /// Code of the embedder's that takes and returns data, and cannot call back.
 pub type DataFunction = Box<dyn FnMut(&[Datum]) -> Result<Datum, HostFailure> + Send>;

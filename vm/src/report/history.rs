@@ -13,9 +13,9 @@ use super::task_label;
 use crate::describe::describe;
 use crate::heap::AllocError;
 use crate::interp::start::first_code_of;
+use crate::names::load::{TOP_LEVEL, is_of_library};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::load::{TOP_LEVEL, is_of_library};
 
 /// Fields of a history, and of an origin: see `handlers.esl`.
 const FRAMES: usize = 0;
@@ -65,7 +65,7 @@ impl Vm {
             Some(NotedFrame {
                 name: code.name,
                 is_top_level: number & 1 != 0,
-                place: self.world.source_place(&self.heap, pair[0], (number >> 1) as u32),
+                place: self.names.source_place(&self.heap, pair[0], (number >> 1) as u32),
                 is_of_library: is_of_library(code),
             })
         };
@@ -83,7 +83,7 @@ impl Vm {
         if is_of_library(self.heap.code(code)?) {
             return None;
         }
-        (0..WORDS_TO_PLACE).find_map(|word| self.world.source_place(&self.heap, code, word))
+        (0..WORDS_TO_PLACE).find_map(|word| self.names.source_place(&self.heap, code, word))
     }
 
     /// Returns the calls of a history, innermost first: those of the tasks in which the failure began come

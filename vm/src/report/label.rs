@@ -5,11 +5,11 @@ use esl_bytecode::datum::Datum;
 use crate::datum;
 use crate::describe::describe;
 use crate::heap::{Heap, Kind};
+use crate::names::class;
 use crate::task::{Task, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::{event, input, link, operation};
-use crate::world::class;
+use crate::wait::{event, handle, input, link};
 
 /// Returns what reports call the task that `object` stands for.
 pub(crate) fn task_label(vm: &Vm, object: Value) -> String {
@@ -41,8 +41,8 @@ pub(crate) fn event_label(vm: &Vm, event: Value) -> String {
         return "nothing".into();
     }
     match vm.heap.slot_or_nil(event, event::NAME) {
-        name if operation::is_handle(&vm.heap, event) => {
-            format!("operation {} {}", describe(&vm.heap, name), operation::number(&vm.heap, event))
+        name if handle::is_handle(&vm.heap, event) => {
+            format!("operation {} {}", describe(&vm.heap, name), handle::number(&vm.heap, event))
         }
         name if input::is_input(&vm.heap, event) => format!("input {}", describe(&vm.heap, name)),
         _ if event == vm.scheduler.any_event => "any event".into(),
@@ -83,9 +83,9 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
     }
     let labels: Vec<String> = events.iter().map(|&event| event_label(vm, event)).collect();
     match &labels[..] {
-        [label] if what == vm.world.known.task_end => format!("the end of {label}"),
+        [label] if what == vm.names.known.task_end => format!("the end of {label}"),
         [label] if vm.heap.is(first, Kind::Task) => format!("a signal of {label}"),
-        [_] if what == vm.world.known.room => {
+        [_] if what == vm.names.known.room => {
             format!("room in input {}", describe(&vm.heap, vm.heap.slot_or_nil(first, event::NAME)))
         }
         labels => labels.join(" or "),
@@ -214,7 +214,7 @@ pub(super) fn items(vm: &Vm, list: Value) -> impl Iterator<Item = Value> {
 /// Returns how a task has ended, in a word.
 pub(crate) fn end_label(vm: &Vm, task: &Task) -> &'static str {
     let status = vm.heap.slot_or_nil(task.object, event::STATE);
-    let known = &vm.world.known;
+    let known = &vm.names.known;
     match status {
         status if status == known.succeeded => "succeeded",
         status if status == known.failed => "failed",
@@ -256,7 +256,7 @@ pub(crate) fn failure_arguments(vm: &Vm, condition: Value) -> Vec<Datum> {
         return Vec::new();
     }
     let list = heap.structure_slots(condition).and_then(|slots| slots.get(1).copied()).unwrap_or(Value::NIL);
-    let export = |value| datum::export(heap, &vm.world, value).ok();
+    let export = |value| datum::export(heap, &vm.names, value).ok();
     items(vm, list).filter_map(export).map(|(datum, _)| datum).collect()
 }
 

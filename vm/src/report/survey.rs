@@ -206,7 +206,7 @@ fn figures(vm: &Vm, tasks: [u64; 4]) -> RunFigures {
 
 /// Returns the value of a variable of the library outside of all bindings; `NIL` if it has none.
 fn variable(vm: &Vm, name: &str) -> Value {
-    let symbol = vm.world.find(&Symbol::esl(name)).and_then(|symbol| vm.heap.symbol(symbol));
+    let symbol = vm.names.find(&Symbol::esl(name)).and_then(|symbol| vm.heap.symbol(symbol));
     symbol.map_or(Value::NIL, |symbol| symbol.value)
 }
 

@@ -129,7 +129,7 @@ pub(crate) fn program_place(vm: &Vm, task: &Task) -> Option<String> {
 
 /// Returns the place at which a frame stands.
 pub(super) fn place_of(vm: &Vm, frame: &Frame<'_>) -> Option<SourcePlace> {
-    vm.world.source_place(&vm.heap, vm.heap.function_code(frame.function)?, frame.place())
+    vm.names.source_place(&vm.heap, vm.heap.function_code(frame.function)?, frame.place())
 }
 
 /// Returns the text of the place at which a frame stands.
@@ -147,7 +147,7 @@ pub(crate) fn place_in_program<'a>(
     frames: impl Iterator<Item = Frame<'a>>,
 ) -> Option<SourcePlace> {
     let place = |code: Value, word: usize| {
-        let place = vm.world.source_place(&vm.heap, code, word as u32);
+        let place = vm.names.source_place(&vm.heap, code, word as u32);
         place.filter(|place| !is_of_library(&place.source))
     };
     let in_frame = |frame: Frame<'_>| place(vm.heap.function_code(frame.function)?, frame.place() as usize);

@@ -22,7 +22,7 @@ const CHARACTERS: usize = 200;
 pub(crate) fn variables_of(vm: &Vm, frame: &Frame<'_>) -> Vec<(String, Value)> {
     let mut found: Vec<(String, Value)> = Vec::new();
     let Some(code) = vm.heap.function_code(frame.function) else { return found };
-    for (name, place) in vm.world.variables_at(&vm.heap, code, frame.place()) {
+    for (name, place) in vm.names.variables_at(&vm.heap, code, frame.place()) {
         let Some(value) = frame.value_at(&vm.heap, place) else { continue };
         found.retain(|(other, _)| *other != name);
         // The box belongs to the machine.
@@ -95,7 +95,7 @@ fn reported_name(vm: &Vm, frame: &Frame<'_>) -> String {
         return function_name(&vm.heap, frame.function);
     }
     let header = vm.heap.header(frame.function);
-    let is_top_level = header.is_some_and(|header| header.aux == crate::world::load::TOP_LEVEL);
+    let is_top_level = header.is_some_and(|header| header.aux == crate::names::load::TOP_LEVEL);
     if is_top_level { "top level" } else { "(LAMBDA)" }.into()
 }
 

@@ -4,7 +4,7 @@ use esl_bytecode::datum::Datum;
 use esl_host::{Awaited, Host, Incoming, Look, ProcessSignal, Question, Wake};
 
 use super::finish::allocate_without_retry;
-use super::operation::{hear, import_list};
+use super::news::{hear, import_list};
 use super::question::{abort_call, abort_task, release, take_question};
 use super::signal::signal;
 use super::spawn::{SpawnOptions, make_task};
@@ -145,7 +145,7 @@ fn end_by_signal(vm: &mut Vm, signal: ProcessSignal) -> bool {
 
 /// Starts a task of the program for a signal of the process that it handles.
 fn handle_signal(vm: &mut Vm, function: Value) {
-    let options = SpawnOptions { name: vm.world.known.on_signal, ..SpawnOptions::default() };
+    let options = SpawnOptions { name: vm.names.known.on_signal, ..SpawnOptions::default() };
     let start = |vm: &mut Vm| make_task(vm, function, Value::NIL, options).map(|_| Value::T);
     if allocate_without_retry(vm, start).is_nil() {
         vm.outside.complain("There is no memory left for the task that handles a signal.\n");

@@ -18,7 +18,7 @@ use crate::wait::{event, lineage};
 /// Notes how the running task has ended, wakes the tasks that wait for it, and answers a call from outside.
 pub(super) fn finish_task(vm: &mut Vm) {
     let end = match vm.scheduler.turn.ending.take().unwrap_or(TaskEnd::Succeeded) {
-        TaskEnd::Spent => TaskEnd::Failed(vm.world.known.budget_exhausted),
+        TaskEnd::Spent => TaskEnd::Failed(vm.names.known.budget_exhausted),
         end => end,
     };
     let mut values = std::mem::take(&mut vm.exchange.values);
@@ -34,9 +34,9 @@ pub(super) fn finish_task(vm: &mut Vm) {
     vm.heap.set_aux(object, Kind::Task, u16::from(has_one_value));
     lineage::end(&mut vm.heap, object);
     let status = match end {
-        TaskEnd::Succeeded => vm.world.known.succeeded,
-        TaskEnd::Failed(_) | TaskEnd::Spent => vm.world.known.failed,
-        TaskEnd::Aborted => vm.world.known.aborted,
+        TaskEnd::Succeeded => vm.names.known.succeeded,
+        TaskEnd::Failed(_) | TaskEnd::Spent => vm.names.known.failed,
+        TaskEnd::Aborted => vm.names.known.aborted,
     };
     if let Some(slots) = vm.heap.slots_mut::<{ event::TASK_LENGTH }>(object, Kind::Task) {
         slots[event::RESULT] = result;
@@ -69,7 +69,7 @@ pub(super) fn finish_task(vm: &mut Vm) {
     vm.exchange.values = values;
     // The list of arguments is made only if a task waits for it.
     allocate_without_retry(vm, |vm| {
-        let end = vm.world.known.task_end;
+        let end = vm.names.known.task_end;
         let arguments = if is_awaited { vm.heap.cons(end, Value::NIL)? } else { Value::NIL };
         wake_waiters(vm, object, arguments).map(|()| Value::NIL)
     });

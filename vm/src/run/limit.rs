@@ -42,7 +42,7 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, amount: Opt
         scheduler.set_timer(now.saturating_add(time), index, Due::Limit(number));
     }
     if amount.is_some_and(|amount| amount.measure == Measure::Ticks && amount.units == 0) {
-        expire(vm, index, number, vm.world.known.budget_exhausted);
+        expire(vm, index, number, vm.names.known.budget_exhausted);
     }
     true
 }
@@ -61,7 +61,7 @@ pub(super) fn expire_in_time(vm: &mut Vm, index: TaskIndex, number: LimitNumber,
                 vm.scheduler.timers.push(time, index, Due::Limit(number));
             }
         }
-        _ => expire(vm, index, number, vm.world.known.timeout),
+        _ => expire(vm, index, number, vm.names.known.timeout),
     }
 }
 
@@ -100,7 +100,7 @@ pub(crate) fn go_on(vm: &mut Vm) {
 /// Charges ticks or bytes to an account and those above it; limits whose accounts are spent by it expire.
 pub(super) fn charge_account(vm: &mut Vm, id: AccountId, measure: Measure, units: u64) {
     for (index, number) in vm.scheduler.accounts.charge(id, measure, units) {
-        expire(vm, index, number, vm.world.known.budget_exhausted);
+        expire(vm, index, number, vm.names.known.budget_exhausted);
     }
 }
 
@@ -121,7 +121,7 @@ pub(crate) fn admit(vm: &mut Vm, measure: Measure) -> Result<(), Exit> {
 fn admit_to(vm: &mut Vm, account: AccountId, measure: Measure) -> Result<(), Exit> {
     let Err(expired) = vm.scheduler.accounts.admit(account, measure) else { return Ok(()) };
     for (index, number) in expired {
-        expire(vm, index, number, vm.world.known.budget_exhausted);
+        expire(vm, index, number, vm.names.known.budget_exhausted);
     }
     Err(Exit::Again)
 }

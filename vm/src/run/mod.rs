@@ -8,7 +8,7 @@
 //! finish    its end                   abort     asking for it
 //! call      calling a function from   arrival   taking in what has come
 //!           outside, and its result             into the inbox
-//! operation news of operations        cleanup   allowances of cleanups, and cutting off
+//! news      news of operations        cleanup   allowances of cleanups, and cutting off
 //! question  calls from outside,       ending    the end of a run, wherever it stands
 //!           and what is asked of tasks rest     suspended tasks that stand where they wait
 //! ```
@@ -25,7 +25,7 @@ mod cleanup;
 mod ending;
 mod finish;
 mod limit;
-mod operation;
+mod news;
 mod pending;
 mod question;
 mod rest;
@@ -49,7 +49,7 @@ pub(crate) use turn::{give_turn, go_on_with_turn};
 use esl_host::{Awaited, Host, RunCheck};
 
 use abort::abort_more;
-use operation::expects_news;
+use news::expects_news;
 use timers::{go_on_in_time, look_at_clock};
 
 use crate::task::{TaskId, TaskIndex, TaskState};

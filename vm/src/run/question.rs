@@ -79,7 +79,7 @@ impl Vm {
             Some((package, name)) => (package.trim_end_matches(':'), name),
             None => (USER_PACKAGE, &**name),
         };
-        let packages = self.world.packages();
+        let packages = self.names.packages();
         let found = packages.named(package).and_then(|package| packages.find(package, name));
         let symbol = found.map_or_else(|| Symbol::new(&package.into(), name), |(symbol, _)| symbol);
         let symbol = Datum::symbol(symbol, Default::default());
@@ -96,7 +96,7 @@ pub(super) fn release(vm: &mut Vm, number: u64) {
 fn import_datum(vm: &mut Vm, datum: &Datum) -> Option<Value> {
     // A cons around it tells `NIL` from a lack of room.
     let cell = allocate_without_retry(vm, |vm| {
-        let (value, _) = datum::import(&mut vm.heap, &mut vm.world, datum)?;
+        let (value, _) = datum::import(&mut vm.heap, &mut vm.names, datum)?;
         Ok(vm.heap.cons(value, Value::NIL)?)
     });
     vm.heap.as_cons(cell).map(|cell| cell.car)
@@ -178,7 +178,7 @@ pub(super) fn answer_call(vm: &mut Vm, end: TaskEnd, values: &[Value]) -> bool {
 fn answer_with(vm: &Vm, values: &[Value]) -> Answer {
     let mut data = Vec::new();
     for &value in values {
-        match datum::export(&vm.heap, &vm.world, value) {
+        match datum::export(&vm.heap, &vm.names, value) {
             Ok((datum, _)) => data.push(datum),
             Err(DatumError::Circular) => return Answer::Circular,
             Err(DatumError::TooLarge | DatumError::NoRoom(_)) => return Answer::TooLarge,

@@ -49,7 +49,7 @@ fn has_deadline(vm: &Vm, task: &Task) -> bool {
 /// Returns whether a task is in a form with procedures for its suspension, as far as it takes to know.
 fn has_procedures(vm: &Vm, task: &Task) -> bool {
     let bindings = task.control.get().map(|control| &control.bindings);
-    let symbol = vm.world.known.suspension_procedures;
+    let symbol = vm.names.known.suspension_procedures;
     let Some(mut rest) = bindings.and_then(|bindings| bindings.get(symbol)) else { return false };
     for _ in 0..PROCEDURES {
         // Each is a list that begins with its task; those of makers are not its own.

@@ -73,7 +73,7 @@ impl Vm {
             scheduler.accounts.leave(account);
             lineage::end(&mut self.heap, object);
             self.heap.slot_set(object, event::RESULT, Value::NIL);
-            self.heap.slot_set(object, event::STATE, self.world.known.aborted);
+            self.heap.slot_set(object, event::STATE, self.names.known.aborted);
         }
         if let Some(mut task) = self.scheduler.tasks.remove(id) {
             task.uncount(&mut self.heap);
@@ -132,7 +132,7 @@ pub(crate) fn make_task(
     if !options.hidden {
         admit(vm, Measure::Tasks)?;
     }
-    let Vm { heap, world, scheduler, exchange, .. } = vm;
+    let Vm { heap, names, scheduler, exchange, .. } = vm;
     let call = FirstCall::new(heap, function, arguments);
     let words = call.words();
     let maker = scheduler.running.as_ref();
@@ -184,7 +184,7 @@ pub(crate) fn make_task(
         {
             exchange.charge(2 * control.bindings.len());
             // Restarts and recoveries around the maker cannot be reached from another task.
-            let without = [world.known.restarts, world.known.recoveries];
+            let without = [names.known.restarts, names.known.recoveries];
             task.control.bindings = control.bindings.copy(&without);
         }
     }

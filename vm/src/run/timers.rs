@@ -7,7 +7,7 @@ use esl_host::{Awaited, Host, Wake};
 
 use super::arrival::{serve_looks, wait_in_host, wake_readers};
 use super::limit::expire_in_time;
-use super::operation::{expects_news, say_what_operators_can_do};
+use super::news::{expects_news, say_what_operators_can_do};
 use super::tell_how_far;
 use super::wake::{call_attention, make_runnable};
 use crate::schedule::{Due, Scheduler};

@@ -248,7 +248,7 @@ fn begin_running(vm: &mut Vm, has_pending: bool) -> Result<(), Leave> {
     let task = vm.scheduler.task();
     if task.critical > 0 && vm.scheduler.turn.critical_left <= 0 && !task.control.is_unwinding() {
         vm.scheduler.task_mut().critical = 0;
-        let (function, cause) = (vm.world.known.raise, vm.world.known.budget_exhausted);
+        let (function, cause) = (vm.names.known.raise, vm.names.known.budget_exhausted);
         interp::interrupt(vm, function, &[cause], None)?;
     }
     Ok(())

@@ -9,8 +9,8 @@
 //! index of the newest of these; `table.previous[i]` is what it had before binding `i`, plus one, or 0.
 
 use super::copy_with_room;
+use crate::names::GivenMap;
 use crate::value::Value;
-use crate::world::GivenMap;
 
 /// Number of bindings searched one by one; at most twice as many.
 const NEAR: usize = 32;

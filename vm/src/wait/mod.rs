@@ -3,7 +3,7 @@
 //! ```text
 //! event | name | count | first | last |          task | as an event | state | result | checkpoints |
 //!                          |       +-----------------------------+
-//! operation | as an event | state | result | progress | number | performer |
+//! handle | as an event | state | result | progress | number | performer |
 //! input | as an event | first kept | last kept | size | capacity | rule | dropped | room |
 //! link  | owner | event | previous | next | more | queue | deadline |
 //! node  | number, or NIL | node of the maker |
@@ -16,10 +16,10 @@
 
 mod delivery;
 pub(crate) mod event;
+pub(crate) mod handle;
 pub(crate) mod input;
 pub(crate) mod lineage;
 pub(crate) mod link;
-pub(crate) mod operation;
 
 pub(crate) use delivery::{Deliveries, Delivery};
 pub(crate) use link::WaitOptions;

@@ -7,10 +7,10 @@
 use crate::builtins::COPY_LIMIT;
 use crate::builtins::expect::exactly;
 use crate::heap::Heap;
+use crate::names::stream::{StreamKind, make_stream, slot};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::stream::{StreamKind, make_stream, slot};
 
 use super::{BLOCK, FIRST_BUFFER, StreamUse, set_stream_slot, stream_index, stream_slot};
 

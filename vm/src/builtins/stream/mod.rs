@@ -1,7 +1,7 @@
 //! Streams: the standard ones, those that read from or write to a string, and channels, for which functions
 //! of the library read and write, such as those of files and sockets.
 //!
-//! A Stream is a record ([`crate::world::stream`]). The operations of a custom stream are in ESL: its
+//! A Stream is a record ([`crate::names::stream`]). The operations of a custom stream are in ESL: its
 //! builtins leave it to their twins. Output to a string is gathered in strings that never grow, so that the
 //! millionth character takes as long as the first. Every output stream knows its column.
 
@@ -15,13 +15,13 @@ use crate::builtins::symbol::text_between;
 use crate::equality::characters_of;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Kind};
+use crate::names::stream::{StreamKind, make_stream, slot};
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::run;
 use crate::schedule::Parking;
 use crate::task::TaskEnd;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::stream::{StreamKind, make_stream, slot};
 
 mod channel;
 mod file;
@@ -101,8 +101,8 @@ fn set_stream_slot(heap: &mut Heap, stream: Value, index: usize, value: Value) {
 /// Returns the open stream that `v` designates for reading or writing: `NIL` is the standard one, `T` the
 /// terminal.
 fn designated_stream(vm: &mut Vm, v: Value, is_input: bool) -> Result<(Value, StreamKind), Exit> {
-    let known = vm.world.known;
-    let [input, output, _] = vm.world.streams;
+    let known = vm.names.known;
+    let [input, output, _] = vm.names.streams;
     let (variable, terminal) =
         if is_input { (known.standard_input, input) } else { (known.standard_output, output) };
     let stream = match v {
@@ -142,7 +142,7 @@ fn input_of<T>(vm: &mut Vm, taken: Taken<T>) -> Result<Option<T>, Exit> {
         // The builtin is done again when the task is woken.
         Taken::WouldBlock => Err(Exit::Park),
         Taken::Failed(error) => {
-            let stream = vm.world.streams[0];
+            let stream = vm.names.streams[0];
             vm.exchange.raise(Raised::Stream(stream, format!("it cannot be read: {error}")))
         }
     }
@@ -303,7 +303,7 @@ fn check_output(vm: &mut Vm) -> Result<(), Exit> {
     match vm.outside.console.take_failure() {
         None => Ok(()),
         Some(error) => {
-            let stream = vm.world.streams[1];
+            let stream = vm.names.streams[1];
             vm.exchange.raise(Raised::Stream(stream, format!("it cannot be written: {error}")))
         }
     }
@@ -388,7 +388,7 @@ pub(crate) fn more_input(vm: &mut Vm) -> Result<(), Exit> {
 
 pub(super) fn standard_stream(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let index = vm.exchange.index_below(arguments[0], 3)?;
-    Ok(vm.world.streams[index])
+    Ok(vm.names.streams[index])
 }
 
 pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -490,7 +490,7 @@ pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         StreamKind::Channel if name.is_nil() => "CHANNEL",
         StreamKind::Channel => "FILE",
     };
-    let kind = vm.world.keyword(&mut vm.heap, kind)?;
+    let kind = vm.names.keyword(&mut vm.heap, kind)?;
     vm.give_values(&[kind, name])
 }
 

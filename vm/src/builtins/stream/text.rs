@@ -5,10 +5,10 @@ use smallvec::SmallVec;
 use crate::builtins::expect::{exactly, optional};
 use crate::builtins::list::list_items;
 use crate::builtins::{COPY_LIMIT, LIMIT};
+use crate::names::stream::{StreamKind, make_stream, slot};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::stream::{StreamKind, make_stream, slot};
 
 use super::{FIRST_BUFFER, designated_stream, few_characters, set_stream_slot, stream_index, stream_slot};
 

@@ -94,8 +94,8 @@ fn objects(vm: &mut Vm) -> Vec<Value> {
         all.push(table);
     }
     let state = crate::builtins::float::make_random_state(vm, &[Value::NIL]).unwrap();
-    let symbol = vm.world.intern_cl(&mut vm.heap, "CAR").unwrap();
-    let keyword = vm.world.keyword(&mut vm.heap, "END").unwrap();
+    let symbol = vm.names.intern_cl(&mut vm.heap, "CAR").unwrap();
+    let keyword = vm.names.keyword(&mut vm.heap, "END").unwrap();
     all.extend([state, symbol, keyword]);
     all
 }

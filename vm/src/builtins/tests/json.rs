@@ -12,7 +12,7 @@ use crate::vm::Vm;
 
 /// Reads a string from its first character on, in which `false` is `NIL` and `null` is `:NULL`.
 fn read_value(vm: &mut Vm, string: Value, are_tables: bool) -> Outcome {
-    let null = vm.world.keyword(&mut vm.heap, "NULL").unwrap();
+    let null = vm.names.keyword(&mut vm.heap, "NULL").unwrap();
     let are_tables = Value::boolean(are_tables);
     json::value(vm, &[string, Value::small(0), are_tables, are_tables, Value::NIL, null])
 }

@@ -147,7 +147,7 @@ impl Evaluator<'_> {
         match token {
             "nil" => Value::NIL,
             "t" => Value::T,
-            _ => vm.world.intern(&mut vm.heap, &Symbol::cl(&token.to_uppercase())).unwrap(),
+            _ => vm.names.intern(&mut vm.heap, &Symbol::cl(&token.to_uppercase())).unwrap(),
         }
     }
 }
@@ -213,7 +213,7 @@ fn show_result(vm: &mut Vm, result: &Result<Vec<Value>, Exit>) -> String {
                 format!("type-error {} {expected}", show(vm, datum))
             }
             Some(raised @ Raised::Bounds(..)) => {
-                let arguments = raised.arguments(&mut vm.heap, &mut vm.world).unwrap();
+                let arguments = raised.arguments(&mut vm.heap, &mut vm.names).unwrap();
                 format!("type-error {} {}", show(vm, arguments[1]), show(vm, arguments[2]))
             }
             Some(Raised::Variable(symbol, datum, Expected::Type(name))) => {
@@ -256,7 +256,7 @@ fn show(vm: &Vm, v: Value) -> String {
         let text: String = characters.iter().filter_map(|&code| char::from_u32(code)).collect();
         return format!("{text:?}");
     }
-    if let Some(symbol) = vm.world.object_of(heap, v).and_then(|object| heap.symbol(object)) {
+    if let Some(symbol) = vm.names.object_of(heap, v).and_then(|object| heap.symbol(object)) {
         return heap.string_text(symbol.name).unwrap();
     }
     if let Some(elements) = vector_elements(heap, v) {

@@ -17,9 +17,9 @@ use esl_bytecode::symbol::Symbol;
 use esl_host::VirtualHost;
 
 use crate::describe::describe;
+use crate::names::load::{Alone, load};
 use crate::value::Value;
 use crate::vm::{Config, Vm};
-use crate::world::load::{Alone, load};
 
 /// Returns the constants `k0`, `k1` and so on.
 fn constants() -> Vec<Constant> {
@@ -152,15 +152,15 @@ impl Machine {
 
     pub(super) fn with(config: Config) -> Machine {
         let mut vm = Vm::new(config, Box::new(VirtualHost::new())).unwrap();
-        let Vm { heap, world, .. } = &mut vm;
-        let mut intern = |name| world.intern(heap, &Symbol::esl(name)).unwrap();
+        let Vm { heap, names, .. } = &mut vm;
+        let mut intern = |name| names.intern(heap, &Symbol::esl(name)).unwrap();
         let [class, x, y] = ["POINT", "X", "Y"].map(&mut intern);
-        world.define_class(heap, class, &[], &[x, y], Value::NIL).unwrap();
+        names.define_class(heap, class, &[], &[x, y], Value::NIL).unwrap();
         let mut machine = Machine(vm, None);
         let successor = machine.load(["make-closure r0 k14 \n return r0"])[0];
         let successor = machine.0.call(successor, &[], u64::MAX).unwrap()[0];
-        let Vm { heap, world, .. } = &mut machine.0;
-        let symbol = world.intern(heap, &Symbol::esl("SUCCESSOR")).unwrap();
+        let Vm { heap, names, .. } = &mut machine.0;
+        let symbol = names.intern(heap, &Symbol::esl("SUCCESSOR")).unwrap();
         heap.symbol_set_function(symbol, successor).unwrap();
         machine
     }
@@ -183,10 +183,10 @@ impl Machine {
 
     /// Sets the special variable to a new point.
     fn set_point(&mut self) {
-        let Vm { heap, world, .. } = &mut self.0;
-        let mut intern = |name| world.intern(heap, &Symbol::esl(name)).unwrap();
+        let Vm { heap, names, .. } = &mut self.0;
+        let mut intern = |name| names.intern(heap, &Symbol::esl(name)).unwrap();
         let [v, name] = ["V", "POINT"].map(&mut intern);
-        let class = world.find_class(name).unwrap();
+        let class = names.find_class(name).unwrap();
         let point = heap.alloc_structure(class, &[Value::small(3), Value::small(4)]).unwrap();
         heap.symbol_set_value(v, point).unwrap();
     }
@@ -197,8 +197,8 @@ impl Machine {
         let mains = shared_functions().len()..functions.len();
         let toplevel = mains.clone().map(|number| FunctionNumber(number as u32)).collect();
         let module = Module { constants: constants(), functions, toplevel, ..Module::default() };
-        let Vm { heap, world, .. } = &mut self.0;
-        let mut rest = load(heap, world, &module, &mut Alone::default()).unwrap();
+        let Vm { heap, names, .. } = &mut self.0;
+        let mut rest = load(heap, names, &module, &mut Alone::default()).unwrap();
         self.0.pin(rest);
         let mut items = Vec::with_capacity(mains.len());
         while let Some(pair) = self.0.heap.as_cons(rest) {

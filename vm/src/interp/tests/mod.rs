@@ -7,11 +7,11 @@ use esl_bytecode::symbol::Symbol;
 use esl_host::VirtualHost;
 
 use crate::fused::FUSED;
+use crate::names::load::{Alone, load};
 use crate::run::RunOutcome;
 use crate::task::TaskResult;
 use crate::value::Value;
 use crate::vm::{Config, Vm};
-use crate::world::load::{Alone, load};
 
 mod arms;
 mod fused;
@@ -43,7 +43,7 @@ fn install(vm: &mut Vm, functions: Vec<ModuleFunction>) -> Value {
     constants.extend((1..functions.len()).map(|number| Constant::Function(FunctionNumber(number as u32))));
     let module = Module { constants, functions, toplevel: vec![FunctionNumber(0)], ..Module::default() };
     let list =
-        load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default()).expect("the module is in order");
+        load(&mut vm.heap, &mut vm.names, &module, &mut Alone::default()).expect("the module is in order");
     let toplevel = vm.heap.car(list).expect("one top-level function");
     vm.pin(toplevel);
     toplevel

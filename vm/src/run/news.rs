@@ -5,7 +5,7 @@ use crate::datum;
 use crate::outside::ExpectedOperators;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::{event, operation};
+use crate::wait::{event, handle};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
@@ -52,11 +52,11 @@ const SAID: usize = 5;
 pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
     let Some(open) = vm.outside.operations.open.get(&number) else { return };
     let (handle, is_cancelled) = (open.handle, open.is_cancelled);
-    let known = vm.world.known;
+    let known = vm.names.known;
     let (state, items) = match news {
         News::Progress(values) => {
             let values = import_list(vm, &values).unwrap_or(Value::NIL);
-            vm.heap.slot_set(handle, operation::PROGRESS, values);
+            vm.heap.slot_set(handle, handle::PROGRESS, values);
             return signal(vm, handle);
         }
         _ if is_cancelled => (known.cancelled, Vec::new()),
@@ -73,8 +73,8 @@ pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
             (known.failed, allocate_without_retry(vm, |vm| Ok(vm.heap.list(&[cause])?)))
         }
     };
-    vm.heap.slot_set(handle, operation::RESULT, result);
-    vm.heap.slot_set(handle, operation::STATE, state);
+    vm.heap.slot_set(handle, handle::RESULT, result);
+    vm.heap.slot_set(handle, handle::STATE, state);
     signal(vm, handle);
     vm.outside.operations.remove(number);
 }
@@ -84,7 +84,7 @@ pub(super) fn import_list(vm: &mut Vm, items: &[Datum]) -> Option<Value> {
     let list = Datum::list(items.iter().cloned(), Span::default());
     // A cons around it tells the empty list from a lack of room.
     let cell = allocate_without_retry(vm, |vm| {
-        let (list, _) = datum::import(&mut vm.heap, &mut vm.world, &list)?;
+        let (list, _) = datum::import(&mut vm.heap, &mut vm.names, &list)?;
         Ok(vm.heap.cons(list, Value::NIL)?)
     });
     vm.heap.as_cons(cell).map(|cell| cell.car)

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use esl_bytecode::package::{PackageId, Packages};
 
 use crate::heap::{AllocError, Heap, Kind};
+use crate::names::Names;
 use crate::value::Value;
-use crate::world::World;
 
-impl World {
+impl Names {
     /// Returns the number and the object of the package of this name. An undefined name becomes a package
     /// without symbols, so that code can be loaded before its `defpackage` has run.
     pub(super) fn home(

@@ -11,8 +11,8 @@ use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
 use esl_bytecode::span::Span;
 
 use crate::heap::{AllocError, Heap};
+use crate::names::{GivenMap, Names};
 use crate::value::Value;
-use crate::world::{GivenMap, World};
 
 /// The things that the program holds.
 #[derive(Clone, Default)]
@@ -30,7 +30,7 @@ pub(crate) struct Opaques {
 /// Slots of an object; the library knows them too (`operations.esl`).
 const SLOTS: [&str; 3] = ["NUMBER", "KIND", "TEXT"];
 
-impl World {
+impl Names {
     /// Returns the object of a thing of the embedder's.
     ///
     /// # Errors

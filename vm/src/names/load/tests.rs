@@ -66,7 +66,7 @@ fn run(vm: &mut Vm, toplevel: Value) -> Value {
 
 /// Runs `((adder 2) 40)`.
 fn use_adder(vm: &mut Vm) -> Value {
-    let name = vm.world.intern_esl(&mut vm.heap, "ADDER").unwrap();
+    let name = vm.names.intern_esl(&mut vm.heap, "ADDER").unwrap();
     let adder = vm.call(name, &[Value::small(2)], 1_000).unwrap()[0];
     vm.call(adder, &[Value::small(40)], 1_000).unwrap()[0]
 }
@@ -75,15 +75,15 @@ fn check_loaded(vm: &mut Vm, toplevel: Value) {
     let data = run(vm, toplevel);
     assert_eq!(vm.heap.car(data), vm.heap.cdr(data), "constants keep their identity");
     assert_eq!(use_adder(vm), Value::small(42));
-    let name = vm.world.intern_esl(&mut vm.heap, "ADDER").unwrap();
-    let function = vm.world.function_of(&vm.heap, name).unwrap();
-    let (_, documentation) = vm.world.texts_of_function(&mut vm.heap, function).unwrap().unwrap();
+    let name = vm.names.intern_esl(&mut vm.heap, "ADDER").unwrap();
+    let function = vm.names.function_of(&vm.heap, name).unwrap();
+    let (_, documentation) = vm.names.texts_of_function(&mut vm.heap, function).unwrap().unwrap();
     assert_eq!(vm.heap.string_text(documentation).as_deref(), Some("Makes an adder."));
     let adder = vm.call(name, &[Value::small(2)], 1_000).unwrap()[0];
     let code = vm.heap.function_code(adder).unwrap();
-    let place = vm.world.source_place(&vm.heap, code, 2).unwrap();
+    let place = vm.names.source_place(&vm.heap, code, 2).unwrap();
     assert_eq!((place.source.as_str(), place.line, place.column), ("adder.esl", 7, 3));
-    assert_eq!(vm.world.source_place(&vm.heap, code, 0), None);
+    assert_eq!(vm.names.source_place(&vm.heap, code, 0), None);
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn a_module_runs() {
 fn an_image_runs() {
     let mut vm = Vm::for_tests();
     let image = image(&module());
-    let toplevel = vm.world.open_image(&mut vm.heap, image).unwrap();
+    let toplevel = vm.names.open_image(&mut vm.heap, image).unwrap();
     check_loaded(&mut vm, toplevel);
 }
 
@@ -110,10 +110,10 @@ fn definitions_of_an_image_are_there_without_running_it() {
     for interns_before in [false, true] {
         if interns_before {
             vm = Vm::for_tests();
-            vm.world.intern_esl(&mut vm.heap, "ADDER").unwrap();
+            vm.names.intern_esl(&mut vm.heap, "ADDER").unwrap();
         }
         let image = image(&prepared);
-        let toplevel = vm.world.open_image(&mut vm.heap, image).unwrap();
+        let toplevel = vm.names.open_image(&mut vm.heap, image).unwrap();
         assert_eq!(use_adder(&mut vm), Value::small(42));
         check_loaded(&mut vm, toplevel);
     }
@@ -158,15 +158,15 @@ fn classes_of_an_image_are_made_when_their_names_are_met_parents_first() {
     for first in ["ANIMAL", "BIRD"] {
         let mut vm = Vm::for_tests();
         let image = image(&prepared);
-        vm.world.open_image(&mut vm.heap, image).unwrap();
-        assert_eq!(vm.world.find(&Symbol::esl("BIRD")), None);
-        vm.world.intern_esl(&mut vm.heap, first).unwrap();
+        vm.names.open_image(&mut vm.heap, image).unwrap();
+        assert_eq!(vm.names.find(&Symbol::esl("BIRD")), None);
+        vm.names.intern_esl(&mut vm.heap, first).unwrap();
         let [animal, bird] = ["ANIMAL", "BIRD"].map(|name| {
-            let name = vm.world.intern_esl(&mut vm.heap, name).unwrap();
-            vm.world.find_class(name).expect("the class is made")
+            let name = vm.names.intern_esl(&mut vm.heap, name).unwrap();
+            vm.names.find_class(name).expect("the class is made")
         });
-        assert!(vm.world.is_subclass(&vm.heap, bird, animal), "{first} first");
-        assert!(!vm.world.is_subclass(&vm.heap, animal, bird));
+        assert!(vm.names.is_subclass(&vm.heap, bird, animal), "{first} first");
+        assert!(!vm.names.is_subclass(&vm.heap, animal, bird));
     }
 }
 
@@ -177,7 +177,7 @@ fn collections_do_not_harm_what_is_loaded() {
     let toplevel = vm.load_module(&module()).unwrap();
     check_loaded(&mut vm, toplevel);
     let image = image(&module());
-    let toplevel = vm.world.open_image(&mut vm.heap, image).unwrap();
+    let toplevel = vm.names.open_image(&mut vm.heap, image).unwrap();
     check_loaded(&mut vm, toplevel);
 }
 

@@ -1,4 +1,4 @@
-//! The world of names: symbols, packages, classes, and builtins as functions.
+//! Names: symbols, packages, classes, and builtins as functions.
 //!
 //! The rules of packages (what a name read in a package means) are those of [`esl_bytecode`]; here are the
 //! objects that names stand for in a running machine. A symbol object is made at its first use, and with it,
@@ -7,7 +7,7 @@
 //!
 //! Guarantees: one symbol object for each symbol of a package, for as long as the machine lives. A program
 //! never sees a symbol object for [`Value::NIL`] and [`Value::T`]; their names, functions and properties are
-//! in two *companion* objects, which [`World::object_of`] returns.
+//! in two *companion* objects, which [`Names::object_of`] returns.
 //!
 //! Not here: whether a name may be redefined, which the builtins check; values of task-local bindings
 //! (`task::binding`).
@@ -84,7 +84,7 @@ const CLASS_BYTES: usize = size_of::<(u64, Value)>() + 1;
 
 /// Names, and the objects that they stand for.
 #[derive(Clone)]
-pub(crate) struct World {
+pub(crate) struct Names {
     /// Symbols that the machine uses.
     pub(crate) known: Known,
     /// Whether names of the language may be defined: only while the library is being loaded.
@@ -92,7 +92,7 @@ pub(crate) struct World {
     /// Objects of symbols with a package.
     pub(crate) symbols: CopyOnWrite<GivenMap<Symbol, Value>>,
     /// Names of symbol objects by address, filled on demand.
-    pub(crate) names: RefCell<CopyOnWrite<GivenMap<u64, Symbol>>>,
+    pub(crate) symbol_of: RefCell<CopyOnWrite<GivenMap<u64, Symbol>>>,
     /// Number of the compiler's next uninterned symbol.
     pub(crate) fresh: Cell<u32>,
     /// The rules of packages.
@@ -125,19 +125,19 @@ pub(crate) struct World {
     pub(crate) classes: CopyOnWrite<RootMap<Value>>,
 }
 
-impl World {
-    /// Makes a world of the language's names, with the builtins as its only definitions.
+impl Names {
+    /// Makes the language's names, with the builtins as its only definitions.
     ///
     /// # Errors
     /// [`AllocError`] if the heap is too small for it.
-    pub(crate) fn new(heap: &mut Heap) -> Result<World, AllocError> {
+    pub(crate) fn new(heap: &mut Heap) -> Result<Names, AllocError> {
         let shape = Shape::other(Sort::Undefined, 0);
         let undefined = trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 1, trust::UNDEFINED_WORD)?;
-        let mut world = World {
+        let mut names = Names {
             known: Known::NONE,
             is_open: true,
             symbols: CopyOnWrite::default(),
-            names: RefCell::default(),
+            symbol_of: RefCell::default(),
             fresh: Cell::new(0),
             packages: CopyOnWrite::new(Packages::standard()),
             package_objects: CopyOnWrite::default(),
@@ -154,25 +154,25 @@ impl World {
             opaques: CopyOnWrite::default(),
             classes: CopyOnWrite::default(),
         };
-        world.nil = world.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
-        world.t = world.make_constant(heap, &Symbol::cl("T"), Value::T)?;
-        world.known = Known::intern(&mut world, heap)?;
-        world.streams = stream::standard_streams(heap)?;
+        names.nil = names.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
+        names.t = names.make_constant(heap, &Symbol::cl("T"), Value::T)?;
+        names.known = Known::intern(&mut names, heap)?;
+        names.streams = stream::standard_streams(heap)?;
         let name = heap.alloc_str("RIGHTS")?;
-        world.rights = world.make_symbol(heap, name, Value::NIL, 0)?;
-        let [input, output, error] = world.streams;
-        let package = world.package_object(heap, PackageId::USER)?;
+        names.rights = names.make_symbol(heap, name, Value::NIL, 0)?;
+        let [input, output, error] = names.streams;
+        let package = names.package_object(heap, PackageId::USER)?;
         for (variable, value) in [
-            (world.known.package, package),
-            (world.known.gensym_counter, Value::small(1)),
-            (world.known.standard_input, input),
-            (world.known.standard_output, output),
-            (world.known.error_output, error),
+            (names.known.package, package),
+            (names.known.gensym_counter, Value::small(1)),
+            (names.known.standard_input, input),
+            (names.known.standard_output, output),
+            (names.known.error_output, error),
         ] {
             heap.symbol_set_value(variable, value);
             heap.set_flags(variable, Kind::Symbol, SymbolObject::LOCKED | SymbolObject::SPECIAL);
         }
-        Ok(world)
+        Ok(names)
     }
 
     /// Makes the companion of a symbol that is an immediate.
@@ -251,7 +251,7 @@ impl World {
     /// # Errors
     /// As for every allocation.
     pub(crate) fn check_room(&self, heap: &mut Heap) -> Result<(), AllocError> {
-        let symbols = self.symbols.capacity() + self.names.borrow().capacity();
+        let symbols = self.symbols.capacity() + self.symbol_of.borrow().capacity();
         let objects = self.package_objects.len() + self.homes.len();
         let tables = symbols * SYMBOL_BYTES + objects * OBJECT_BYTES + self.classes.capacity() * CLASS_BYTES;
         heap.set_external(Holder::Names, self.packages.bytes() + tables)
@@ -360,7 +360,7 @@ impl World {
     /// Returns the name of a symbol as the compiler knows it. `None` unless `v` is a symbol with a package.
     pub(crate) fn name_of(&self, heap: &Heap, v: Value) -> Option<Symbol> {
         let object = self.object_of(heap, v)?;
-        if let Some(symbol) = self.names.borrow().get(&object.bits()) {
+        if let Some(symbol) = self.symbol_of.borrow().get(&object.bits()) {
             return Some(symbol.clone());
         }
         let symbol = heap.symbol(object)?;
@@ -368,7 +368,7 @@ impl World {
         let symbol = Symbol::new(&home, &heap.string_text(symbol.name)?);
         // Only interned symbols live as long as the table.
         if self.symbols.contains_key(&symbol) {
-            self.names.borrow_mut().insert(object.bits(), symbol.clone());
+            self.symbol_of.borrow_mut().insert(object.bits(), symbol.clone());
         }
         Some(symbol)
     }
@@ -421,7 +421,7 @@ impl World {
         !self.is_open && flags.is_some_and(|flags| flags & SymbolObject::LOCKED != 0)
     }
 
-    /// Calls `visit` with every object that the world keeps alive.
+    /// Calls `visit` with every object that the names keep alive.
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         self.known.visit(visit);
         [self.nil, self.t, self.rights, self.undefined, self.runner].into_iter().for_each(&mut *visit);
@@ -448,24 +448,24 @@ mod tests {
     #[test]
     fn a_symbol_has_one_object_and_a_builtin_its_function() {
         let mut heap = crate::trust::heap_for_tests();
-        let mut world = World::new(&mut heap).unwrap();
-        let car = world.intern_cl(&mut heap, "CAR").unwrap();
-        assert_eq!(world.intern(&mut heap, &Symbol::cl("CAR")), Ok(car));
-        assert!(world.function_of(&heap, car).is_some());
-        assert_eq!(world.name_of(&heap, car), Some(Symbol::cl("CAR")));
-        let foo = world.intern_esl(&mut heap, "FOO").unwrap();
-        assert_eq!(world.function_of(&heap, foo), None);
-        let keyword = world.keyword(&mut heap, "K").unwrap();
+        let mut names = Names::new(&mut heap).unwrap();
+        let car = names.intern_cl(&mut heap, "CAR").unwrap();
+        assert_eq!(names.intern(&mut heap, &Symbol::cl("CAR")), Ok(car));
+        assert!(names.function_of(&heap, car).is_some());
+        assert_eq!(names.name_of(&heap, car), Some(Symbol::cl("CAR")));
+        let foo = names.intern_esl(&mut heap, "FOO").unwrap();
+        assert_eq!(names.function_of(&heap, foo), None);
+        let keyword = names.keyword(&mut heap, "K").unwrap();
         assert_eq!(heap.symbol(keyword).unwrap().value, keyword);
     }
 
     #[test]
     fn nil_and_t_are_immediates_with_companions() {
         let mut heap = crate::trust::heap_for_tests();
-        let mut world = World::new(&mut heap).unwrap();
-        assert_eq!(world.intern_cl(&mut heap, "NIL"), Ok(Value::NIL));
-        assert_eq!(world.intern_cl(&mut heap, "T"), Ok(Value::T));
-        assert_eq!(world.name_of(&heap, Value::T), Some(Symbol::cl("T")));
-        assert!(world.is_symbol(&heap, Value::NIL));
+        let mut names = Names::new(&mut heap).unwrap();
+        assert_eq!(names.intern_cl(&mut heap, "NIL"), Ok(Value::NIL));
+        assert_eq!(names.intern_cl(&mut heap, "T"), Ok(Value::T));
+        assert_eq!(names.name_of(&heap, Value::T), Some(Symbol::cl("T")));
+        assert!(names.is_symbol(&heap, Value::NIL));
     }
 }

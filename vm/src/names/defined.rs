@@ -12,11 +12,11 @@ use esl_bytecode::symbol::Symbol;
 
 use crate::heap::layout::SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
+use crate::names::load::{self, ImageClass, LoadError};
+use crate::names::{Names, class};
 use crate::value::Value;
-use crate::world::load::{self, ImageClass, LoadError};
-use crate::world::{World, class};
 
-impl World {
+impl Names {
     /// Adds an image. Returns a list of the functions that run its top-level forms, in order.
     ///
     /// # Errors

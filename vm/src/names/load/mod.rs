@@ -27,11 +27,11 @@ use esl_bytecode::verify::VerifyError;
 use crate::fused::fuse;
 use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap, Kind};
+use crate::names::Names;
 use crate::shape::{Shape, Sort, capture_word};
 use crate::trust::LAZY_WORD;
 use crate::trust::{self, Verification, Verified};
 use crate::value::Value;
-use crate::world::World;
 
 mod data;
 mod debug;
@@ -126,13 +126,13 @@ impl SharedObjects for Alone {
 /// [`LoadError`]; then nothing of the module is reachable.
 pub(crate) fn load(
     heap: &mut Heap,
-    world: &mut World,
+    names: &mut Names,
     module: &Module,
     shared: &mut dyn SharedObjects,
 ) -> Result<Value, LoadError> {
     let mut load = ModuleLoad::new(module);
     loop {
-        if let Some(functions) = load.run(heap, world, shared, &mut Work::unbounded())? {
+        if let Some(functions) = load.run(heap, names, shared, &mut Work::unbounded())? {
             return Ok(functions);
         }
     }
@@ -150,7 +150,7 @@ pub(crate) struct ModuleLoad<M> {
     functions: Vec<Value>,
     /// Values of the pool.
     pool: Vec<Value>,
-    names: debug::ModuleNames,
+    debug_names: debug::ModuleNames,
     /// Codes by the numbers of functions.
     codes: Vec<Value>,
     /// Number of functions whose Codes refer to those with captures.
@@ -174,7 +174,7 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
             stub: Value::NIL,
             functions: Vec::new(),
             pool: Vec::new(),
-            names: debug::ModuleNames::default(),
+            debug_names: debug::ModuleNames::default(),
             codes: Vec::new(),
             filled: 0,
             toplevel: None,
@@ -186,7 +186,7 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
         let lists = [&self.functions, &self.pool, &self.codes];
         lists.into_iter().flatten().chain(&self.toplevel).for_each(|&value| visit(value));
         visit(self.stub);
-        self.names.roots(visit);
+        self.debug_names.roots(visit);
     }
 
     /// Returns about how many bytes it takes.
@@ -203,11 +203,12 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
     pub(crate) fn run(
         &mut self,
         heap: &mut Heap,
-        world: &mut World,
+        names: &mut Names,
         shared: &mut dyn SharedObjects,
         work: &mut Work,
     ) -> Result<Option<Value>, LoadError> {
-        let ModuleLoad { module, verification, verified, stub, functions, pool, names, codes, .. } = self;
+        let ModuleLoad { module, verification, verified, stub, functions, pool, debug_names, codes, .. } =
+            self;
         let module = (*module).borrow();
         let verified = match verified {
             Some(verified) => verified,
@@ -232,7 +233,7 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
             let object = if has_captures { Value::NIL } else { trust::alloc_function(heap, *stub, &[])? };
             functions.push(object);
         }
-        let mut constants = Constants { heap, world, shared, functions: &*functions };
+        let mut constants = Constants { heap, names, shared, functions: &*functions };
         while let Some(constant) = module.constants.get(pool.len()) {
             if pool.len().is_multiple_of(OBJECTS_PER_UNIT) {
                 if work.is_done() {
@@ -243,7 +244,7 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
             let value = constants.make(constant, pool)?;
             pool.push(value);
         }
-        if !names.run(heap, module, work)? {
+        if !debug_names.run(heap, module, work)? {
             return Ok(None);
         }
         while let Some(function) = module.functions.get(codes.len()) {
@@ -252,7 +253,7 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
             }
             work.add(1 + (function.code.len() / WORDS_PER_UNIT) as u64);
             let constants = own_constants(function, |PoolIdx(index)| pool[index as usize]);
-            let debug = debug::describe(heap, function, pool, names)?;
+            let debug = debug::describe(heap, function, pool, debug_names)?;
             let parts =
                 LoadedFunction { function, constants: &constants, name: name_of(function, pool), debug };
             let owner = Value::boolean(is_of_module(module, function));
@@ -301,23 +302,23 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
 /// The sources of the values of constants.
 struct Constants<'a> {
     heap: &'a mut Heap,
-    world: &'a mut World,
+    names: &'a mut Names,
     shared: &'a mut dyn SharedObjects,
     functions: &'a [Value],
 }
 
 impl Constants<'_> {
     fn symbol(&mut self, symbol: &Symbol) -> Result<Value, AllocError> {
-        let Home::Uninterned(id) = *symbol.home() else { return self.world.intern(self.heap, symbol) };
+        let Home::Uninterned(id) = *symbol.home() else { return self.names.intern(self.heap, symbol) };
         if let Some(object) = self.shared.uninterned(id) {
             return Ok(object);
         }
         let object = match symbol_of_setf_cell(symbol) {
             Some(named) => {
                 let named = self.symbol(&named)?;
-                self.world.setf_cell_object(self.heap, named)?
+                self.names.setf_cell_object(self.heap, named)?
             }
-            None => self.world.intern(self.heap, symbol)?,
+            None => self.names.intern(self.heap, symbol)?,
         };
         self.shared.note_uninterned(id, object);
         Ok(object)
@@ -397,7 +398,7 @@ fn name_of(function: &ModuleFunction, pool: &[Value]) -> Value {
     function.name.map_or(Value::NIL, |PoolIdx(index)| pool[index as usize])
 }
 
-impl World {
+impl Names {
     /// Returns the place in the source where word `pc` of a code was written.
     pub(crate) fn source_place(&self, heap: &Heap, code: Value, pc: u32) -> Option<SourcePlace> {
         let parts = heap.code(code)?;

@@ -20,11 +20,11 @@ use esl_heap::state::{StateSink, Stated};
 use super::definitions::{Definitions, ImageDefinition, name_of};
 use super::{LoadError, LoadedFunction, character, data, debug, integer, make_code, own_constants, ratio};
 use crate::heap::{AllocError, Heap};
+use crate::names::Names;
 use crate::shape::{Shape, Sort};
 use crate::trust::LAZY_WORD;
 use crate::trust::{self, Verified};
 use crate::value::Value;
-use crate::world::World;
 
 /// The images that a machine runs from.
 #[derive(Clone, Default)]
@@ -118,8 +118,8 @@ impl Images {
 ///
 /// # Errors
 /// [`LoadError`].
-pub(crate) fn open(heap: &mut Heap, world: &mut World, module: Arc<ModuleImage>) -> Result<Value, LoadError> {
-    let number = world.images.0.len();
+pub(crate) fn open(heap: &mut Heap, names: &mut Names, module: Arc<ModuleImage>) -> Result<Value, LoadError> {
+    let number = names.images.0.len();
     let packages = module.packages()?.into_iter().map(Arc::from).collect();
     let shape = Shape::other(Sort::Lazy, 0);
     let image = Image {
@@ -131,8 +131,8 @@ pub(crate) fn open(heap: &mut Heap, world: &mut World, module: Arc<ModuleImage>)
         lazy: trust::alloc_stub(heap, Value::NIL, Value::index(number), shape, 1, LAZY_WORD)?,
         module: module.clone(),
     };
-    world.images.0.push(image);
-    let mut loader = ImageLoader { heap, world, image: number };
+    names.images.0.push(image);
+    let mut loader = ImageLoader { heap, names, image: number };
     let mut toplevel = Vec::new();
     for function in module.toplevel()? {
         toplevel.push(loader.function(function)?);
@@ -146,11 +146,11 @@ pub(crate) fn open(heap: &mut Heap, world: &mut World, module: Arc<ModuleImage>)
 /// As for every allocation.
 pub(crate) fn function(
     heap: &mut Heap,
-    world: &mut World,
+    names: &mut Names,
     image: usize,
     number: u32,
 ) -> Result<Value, AllocError> {
-    ImageLoader { heap, world, image }.function(FunctionNumber(number))
+    ImageLoader { heap, names, image }.function(FunctionNumber(number))
 }
 
 /// Returns the value of a constant of an image, which is data or a function without captures.
@@ -159,11 +159,11 @@ pub(crate) fn function(
 /// As for every allocation. A damaged constant is `NIL`: the image is part of this program.
 pub(crate) fn constant(
     heap: &mut Heap,
-    world: &mut World,
+    names: &mut Names,
     image: usize,
     index: PoolIdx,
 ) -> Result<Value, AllocError> {
-    match (ImageLoader { heap, world, image }).constant(index) {
+    match (ImageLoader { heap, names, image }).constant(index) {
         Err(LoadError::Alloc(error)) => Err(error),
         value => Ok(value.unwrap_or(Value::NIL)),
     }
@@ -172,13 +172,13 @@ pub(crate) fn constant(
 /// A loader at work on one image.
 struct ImageLoader<'a> {
     heap: &'a mut Heap,
-    world: &'a mut World,
+    names: &'a mut Names,
     image: usize,
 }
 
 impl ImageLoader<'_> {
     fn image(&self) -> &Image {
-        &self.world.images.0[self.image]
+        &self.names.images.0[self.image]
     }
 
     fn module(&self) -> Arc<ModuleImage> {
@@ -218,9 +218,9 @@ impl ImageLoader<'_> {
         let object = match self.number_of_named(&symbol) {
             Some(named) => {
                 let named = self.symbol(named)?;
-                self.world.setf_cell_object(self.heap, named)?
+                self.names.setf_cell_object(self.heap, named)?
             }
-            None => self.world.intern(self.heap, &symbol)?,
+            None => self.names.intern(self.heap, &symbol)?,
         };
         self.heap.own_vector_set(table, number as usize, object);
         Ok(object)
@@ -380,11 +380,11 @@ impl ImageLoader<'_> {
 /// Returns lambda list and documentation of a function of an image.
 pub(super) fn texts(
     heap: &mut Heap,
-    world: &mut World,
+    names: &mut Names,
     image: usize,
     number: u32,
 ) -> Result<(Value, Value), LoadError> {
-    let mut loader = ImageLoader { heap, world, image };
+    let mut loader = ImageLoader { heap, names, image };
     let function = loader.module().function(FunctionNumber(number))?;
     let mut constant = |index: Option<PoolIdx>| index.map_or(Ok(Value::NIL), |index| loader.constant(index));
     Ok((constant(function.lambda_list)?, constant(function.documentation)?))
@@ -401,7 +401,7 @@ pub(crate) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
     Some((image, number as u32))
 }
 
-impl World {
+impl Names {
     /// Replaces the stub of a function of an image by its code. Returns the number of words that were
     /// decoded, 0 if the function was ready.
     ///
@@ -413,27 +413,27 @@ impl World {
             .and_then(|code| heap.code(code))
             .is_some_and(|code| Shape::unpack(code.spare[0]).sort == Sort::Lazy);
         let Some((image, number)) = origin(heap, function).filter(|_| is_lazy) else { return Ok(0) };
-        let code = ImageLoader { heap, world: self, image }.code(FunctionNumber(number))?;
+        let code = ImageLoader { heap, names: self, image }.code(FunctionNumber(number))?;
         trust::replace_stub(heap, function, code);
         Ok(heap.code_words(code).map_or(0, <[u32]>::len))
     }
 }
 
 /// Returns the source place of word `pc` of a code of an image.
-pub(super) fn place_of(heap: &Heap, world: &World, code: Value, pc: u32) -> Option<SourcePlace> {
+pub(super) fn place_of(heap: &Heap, names: &Names, code: Value, pc: u32) -> Option<SourcePlace> {
     let parts = heap.code(code)?;
     let (image, number) = (parts.owner.as_index()?, parts.debug.as_index()?);
-    let function = world.images.decode(image, number as u32)?;
+    let function = names.images.decode(image, number as u32)?;
     let entry = debug::entry_at(function.lines.into_iter(), pc)?;
-    let source = world.images.source(image, entry.source)?;
+    let source = names.images.source(image, entry.source)?;
     Some(SourcePlace { source, line: entry.line, column: entry.column })
 }
 
 /// Returns the variables that can be looked at at word `pc` of a code of an image, and where they are.
-pub(super) fn variables_at(heap: &Heap, world: &World, code: Value, pc: u32) -> Vec<(String, VariablePlace)> {
+pub(super) fn variables_at(heap: &Heap, names: &Names, code: Value, pc: u32) -> Vec<(String, VariablePlace)> {
     let number = heap.code(code).and_then(|parts| Some((parts.owner.as_index()?, parts.debug.as_index()?)));
     let Some((image, number)) = number else { return Vec::new() };
-    let Some(image) = world.images.0.get(image) else { return Vec::new() };
+    let Some(image) = names.images.0.get(image) else { return Vec::new() };
     let variables = image.module.variables(FunctionNumber(number as u32)).unwrap_or_default();
     let here = variables.into_iter().filter(|variable| (variable.from..variable.to).contains(&pc));
     here.map(|variable| (variable.name.to_string(), variable.place)).collect()

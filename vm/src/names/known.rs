@@ -3,8 +3,8 @@
 use esl_bytecode::symbol::Symbol;
 
 use crate::heap::{AllocError, Heap};
+use crate::names::Names;
 use crate::value::Value;
-use crate::world::World;
 
 macro_rules! home {
     (cl, $name:literal) => {
@@ -32,8 +32,8 @@ macro_rules! define_known {
             pub(super) const NONE: Known = Known { $( $field: Value::NIL, )* };
 
             /// Makes all of them.
-            pub(super) fn intern(world: &mut World, heap: &mut Heap) -> Result<Known, AllocError> {
-                Ok(Known { $( $field: world.intern(heap, &home!($home, $name))?, )* })
+            pub(super) fn intern(names: &mut Names, heap: &mut Heap) -> Result<Known, AllocError> {
+                Ok(Known { $( $field: names.intern(heap, &home!($home, $name))?, )* })
             }
 
             /// Calls `visit` with each.

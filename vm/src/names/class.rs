@@ -11,8 +11,8 @@
 //! slots that depend on them.
 
 use crate::heap::{AllocError, Heap, Kind};
+use crate::names::Names;
 use crate::value::Value;
-use crate::world::World;
 
 /// Slots of a Class.
 pub(crate) mod slot {
@@ -40,7 +40,7 @@ pub(crate) mod slot {
 /// line.
 pub(crate) const MAX_DEPTH: usize = 200;
 
-impl World {
+impl Names {
     /// Returns the class of this name, a symbol.
     pub(crate) fn find_class(&self, name: Value) -> Option<Value> {
         self.classes.get(&name.bits()).copied()
@@ -193,46 +193,46 @@ fn is_same_layout(heap: &Heap, class: Value, supers: &[Value], slots: &[Value]) 
 mod tests {
     use super::*;
 
-    fn world() -> (Heap, World) {
+    fn names() -> (Heap, Names) {
         let mut heap = crate::trust::heap_for_tests();
-        let world = World::new(&mut heap).unwrap();
-        (heap, world)
+        let names = Names::new(&mut heap).unwrap();
+        (heap, names)
     }
 
-    fn define(heap: &mut Heap, world: &mut World, name: &str, supers: &[Value], slots: &[&str]) -> Value {
-        let name = world.intern_esl(heap, name).unwrap();
-        let slots: Vec<Value> = slots.iter().map(|slot| world.intern_esl(heap, slot).unwrap()).collect();
-        world.define_class(heap, name, supers, &slots, Value::NIL).unwrap()
+    fn define(heap: &mut Heap, names: &mut Names, name: &str, supers: &[Value], slots: &[&str]) -> Value {
+        let name = names.intern_esl(heap, name).unwrap();
+        let slots: Vec<Value> = slots.iter().map(|slot| names.intern_esl(heap, slot).unwrap()).collect();
+        names.define_class(heap, name, supers, &slots, Value::NIL).unwrap()
     }
 
     #[test]
     fn a_subclass_is_told_by_its_line_or_its_other_ancestors() {
-        let (mut heap, mut world) = world();
-        let root = define(&mut heap, &mut world, "ROOT", &[], &[]);
-        let left = define(&mut heap, &mut world, "LEFT", &[root], &[]);
-        let right = define(&mut heap, &mut world, "RIGHT", &[root], &[]);
-        let both = define(&mut heap, &mut world, "BOTH", &[left, right], &[]);
-        let below = define(&mut heap, &mut world, "BELOW", &[both], &[]);
+        let (mut heap, mut names) = names();
+        let root = define(&mut heap, &mut names, "ROOT", &[], &[]);
+        let left = define(&mut heap, &mut names, "LEFT", &[root], &[]);
+        let right = define(&mut heap, &mut names, "RIGHT", &[root], &[]);
+        let both = define(&mut heap, &mut names, "BOTH", &[left, right], &[]);
+        let below = define(&mut heap, &mut names, "BELOW", &[both], &[]);
         let all = [root, left, right, both, below];
         let expected = ["*....", "**...", "*.*..", "****.", "*****"];
         for (class, row) in all.iter().zip(expected) {
             let found: String = all
                 .iter()
-                .map(|&ancestor| if world.is_subclass(&heap, *class, ancestor) { '*' } else { '.' })
+                .map(|&ancestor| if names.is_subclass(&heap, *class, ancestor) { '*' } else { '.' })
                 .collect();
             assert_eq!(found, row);
         }
-        assert!(!world.is_subclass(&heap, Value::NIL, Value::NIL));
+        assert!(!names.is_subclass(&heap, Value::NIL, Value::NIL));
     }
 
     #[test]
     fn a_class_is_kept_when_it_is_defined_again_with_the_same_slots() {
-        let (mut heap, mut world) = world();
-        let point = define(&mut heap, &mut world, "POINT", &[], &["X", "Y"]);
-        assert_eq!(define(&mut heap, &mut world, "POINT", &[], &["X", "Y"]), point);
-        let other = define(&mut heap, &mut world, "POINT", &[], &["X", "Y", "Z"]);
+        let (mut heap, mut names) = names();
+        let point = define(&mut heap, &mut names, "POINT", &[], &["X", "Y"]);
+        assert_eq!(define(&mut heap, &mut names, "POINT", &[], &["X", "Y"]), point);
+        let other = define(&mut heap, &mut names, "POINT", &[], &["X", "Y", "Z"]);
         assert_ne!(other, point);
         let name = class_slot(&heap, point, slot::NAME);
-        assert_eq!(world.find_class(name), Some(other));
+        assert_eq!(names.find_class(name), Some(other));
     }
 }
