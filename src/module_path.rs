@@ -7,7 +7,7 @@
 //!
 //! let path = ModulePath::new([Path::new("plant/main.esl")], &["shared".into()]);
 //! assert_eq!(path.folders()[..2], [Path::new("plant"), Path::new("shared")]);
-//! let missing = path.find("no-such-module").expect_err("there is no such file");
+//! let missing = path.find("no-such-module").expect_err("the file does not exist");
 //! assert!(matches!(missing, ModuleError::NotFound { .. }));
 //! ```
 
@@ -62,12 +62,12 @@ impl fmt::Display for ModuleError {
         match self {
             ModuleError::InvalidName => f.write_str("expected the name of a file, without its type"),
             ModuleError::NotFound { folders, .. } if folders.is_empty() => {
-                f.write_str("there are no folders to search: name some with `--library`")
+                f.write_str("no folders to search: name some with `--library`")
             }
             ModuleError::NotFound { name, folders } => {
                 let folders: Vec<String> =
                     folders.iter().map(|folder| format!("`{}`", folder.display())).collect();
-                write!(f, "there is no `{name}.esl` in {}", folders.join(", "))
+                write!(f, "`{name}.esl` is not in {}", folders.join(", "))
             }
             ModuleError::Unreadable(path, error) => {
                 write!(f, "`{}` cannot be read: {error}", path.display())

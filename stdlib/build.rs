@@ -61,7 +61,7 @@ impl fmt::Display for BuildError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             BuildError::Unreadable(path, error) => write!(f, "{} cannot be read: {error}", path.display()),
-            BuildError::NoMemory => f.write_str("there is no memory for a machine"),
+            BuildError::NoMemory => f.write_str("not enough memory for a machine"),
             BuildError::DoesNotCompile(errors) => f.write_str(errors),
             BuildError::NoModule(name) => write!(f, "{name} gives no module"),
             BuildError::NotLoaded(name, error) => write!(f, "{name} cannot be loaded: {error}"),

@@ -398,7 +398,8 @@ pub fn drive(
     compilation: &mut dyn Compilation,
     host: &mut dyn CompileTimeHost,
 ) -> (Option<Module>, Vec<Diagnostic>) {
-    let driven = drive_with(compilation, host, &mut |_| Err(NoModule("there are no modules here".into())));
+    let driven =
+        drive_with(compilation, host, &mut |_| Err(NoModule("modules are not available here".into())));
     driven.unwrap_or_default()
 }
 

@@ -182,7 +182,7 @@ impl Database {
         let relation = self.find_relation(head.functor, head.arguments.len());
         if relation.is_some_and(|number| self.relations[number as usize].is_property()) {
             held.into_iter().for_each(|term| self.terms.release(term));
-            return Err(FormulaError::Malformed(head_text, "the head of a rule, which is no property"));
+            return Err(FormulaError::Malformed(head_text, "the head of a rule, which is not a property"));
         }
         let rule = Rule { head, body, names, source, held };
         if let Some(replaced) = Arc::make_mut(&mut self.rules).add(rule) {

@@ -93,8 +93,8 @@ pub enum HostError {
 impl fmt::Display for HostError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            HostError::BrokenPipe => f.write_str("nobody reads the other end"),
-            HostError::NotFound => f.write_str("there is no such file"),
+            HostError::BrokenPipe => f.write_str("the other end is closed"),
+            HostError::NotFound => f.write_str("the file does not exist"),
             HostError::Refused => f.write_str("the system does not grant access"),
             HostError::Exists => f.write_str("the file exists already"),
             HostError::Other(text) => f.write_str(text),

@@ -261,7 +261,7 @@ fn compile_each(files: &[PathBuf], options: &SourceOptions) -> Result<u8, u8> {
     let mut status = SUCCESS;
     for file in files {
         if file.as_os_str() == "-" {
-            complain("a program from standard input has no name: say with -o where it goes");
+            complain("a program from standard input has no name: name the output with -o");
             return Err(USAGE);
         }
         let result =

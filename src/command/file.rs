@@ -68,7 +68,7 @@ pub fn refuse_overwriting<'a>(output: &Path, inputs: impl IntoIterator<Item = &'
     }
     if [output, &existing].into_iter().any(is_named_as_source) {
         let name = output.display();
-        complain(format_args!("{name} is there already, and is a source by its name; name another file"));
+        complain(format_args!("{name} exists and has the name of a source: name another file"));
         return Err(USAGE);
     }
     Ok(())
@@ -129,7 +129,7 @@ fn read_bytes(path: &Path) -> Result<(String, Vec<u8>), u8> {
         Ok(_) => Ok((name, bytes)),
         Err(error) => {
             let reason = match error.kind() {
-                ErrorKind::NotFound => "there is no such file".into(),
+                ErrorKind::NotFound => "the file does not exist".into(),
                 ErrorKind::IsADirectory => "it is a directory; name a file in it".into(),
                 ErrorKind::PermissionDenied => "permission denied".into(),
                 _ => error.to_string(),

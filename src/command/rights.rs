@@ -79,7 +79,7 @@ impl RightsOptions {
 fn grant(rights: Rights, right: Right, objects: Option<&str>) -> Result<Rights, &'static str> {
     let Some(objects) = objects else { return Ok(rights.with_all(right)) };
     objects.split(',').try_fold(rights, |rights, object| match object.trim() {
-        "" => Err("expected no empty value between the commas; without a value, all is granted"),
+        "" => Err("empty value between commas: a flag without values grants everything"),
         object => Ok(rights.with(right, object)),
     })
 }

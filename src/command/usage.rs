@@ -24,7 +24,7 @@ pub fn parse<C: Parser + CommandFactory>(file_command: &str, habits: Habits) -> 
     {
         let rest = arguments.iter().skip_while(|argument| argument.to_string_lossy() != *word).skip(1);
         let rest: String = rest.map(|argument| format!(" {}", argument.to_string_lossy())).collect();
-        complain(format_args!("there is no subcommand `{word}`: type `{command}{rest}`"));
+        complain(format_args!("unknown subcommand `{word}`: type `{command}{rest}`"));
         std::process::exit(i32::from(USAGE));
     }
     error.exit()

@@ -44,7 +44,7 @@ pub use report::{CoverageReport, CoveredArm, CoveredFile};
 
 /// Refuses to cover a file that is compiled. Returns the exit status, after a message.
 pub fn refuse_compiled(file: &Path) -> u8 {
-    complain(format_args!("{} is compiled: name its source, which coverage speaks of", file.display()));
+    complain(format_args!("{} is compiled: name its source to measure coverage", file.display()));
     USAGE
 }
 

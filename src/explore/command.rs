@@ -322,7 +322,7 @@ pub fn read_schedule(path: &Path) -> Result<Schedule, u8> {
     })?;
     // A file that is not text is not a schedule either, as its first line shows.
     Schedule::parse(&String::from_utf8_lossy(&bytes)).map_err(|error| {
-        complain(format_args!("{} is no schedule: {error}", path.display()));
+        complain(format_args!("{} is not a schedule: {error}", path.display()));
         command::USAGE
     })
 }

@@ -45,7 +45,7 @@ pub enum UnseenKind {
 impl fmt::Display for UnseenKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            UnseenKind::Read => "what tasks look at",
+            UnseenKind::Read => "data that tasks read",
             UnseenKind::Variable => "changes of special variables",
             UnseenKind::Captured => "changes of variables of closures",
             UnseenKind::Slot => "changes of slots",
@@ -324,7 +324,7 @@ mod tests {
         };
         assert_eq!(
             text(Grain::Changes),
-            "what tasks look at, changes of special variables (unseen.esl:1:29)"
+            "data that tasks read, changes of special variables (unseen.esl:1:29)"
         );
         assert_eq!(text(Grain::Reads), "changes of special variables (unseen.esl:1:29)");
         assert_eq!((text(Grain::Variables), text(Grain::Ticks)), (String::new(), String::new()));

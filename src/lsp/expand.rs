@@ -36,10 +36,10 @@ pub(super) enum NoExpansion {
 impl fmt::Display for NoExpansion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            NoExpansion::UnknownCommand(name) => write!(f, "there is no command `{name}`"),
+            NoExpansion::UnknownCommand(name) => write!(f, "unknown command `{name}`"),
             NoExpansion::Argument(error) => write!(f, "expected a text and a position: {error}"),
             NoExpansion::NotOpen => f.write_str("the text is not open"),
-            NoExpansion::NoForm => f.write_str("there is no form here"),
+            NoExpansion::NoForm => f.write_str("expected a form here"),
             NoExpansion::DoesNotCompile(diagnostic) => f.write_str(&diagnostic.message),
             NoExpansion::CompileTimeOnly => {
                 f.write_str("the form defines something only while the program is compiled")

@@ -88,7 +88,7 @@ pub(super) enum RenameRefusal {
 impl fmt::Display for RenameRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            RenameRefusal::NothingHere => f.write_str("there is no name here"),
+            RenameRefusal::NothingHere => f.write_str("expected a name here"),
             RenameRefusal::NotAName(text) => write!(f, "`{text}` is not a name"),
             RenameRefusal::Foreign(name) => write!(f, "`{name}` does not belong to this program"),
             RenameRefusal::OfLanguage(name) => write!(f, "`{name}` belongs to the language"),

@@ -42,7 +42,7 @@ pub fn new_project(folder: &Path) -> u8 {
     }
     match std::fs::read_dir(folder).map(|mut entries| entries.next().is_some()) {
         Ok(true) => {
-            complain(format_args!("{} is there already, and not empty", folder.display()));
+            complain(format_args!("{} exists and is not empty", folder.display()));
             return USAGE;
         }
         Err(error) if error.kind() != ErrorKind::NotFound => {

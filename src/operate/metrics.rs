@@ -133,7 +133,7 @@ fn text_of(survey: &Survey) -> String {
     let inputs: [(&str, &str, &str, InputFigure); 3] = [
         ("esl_input_signals_total", "counter", "Signals of an input.", |row| row.signals),
         ("esl_input_dropped_total", "counter", "Signals of an input that were dropped.", |row| row.dropped),
-        ("esl_input_waiting", "gauge", "Signals of an input that nobody has taken yet.", kept),
+        ("esl_input_waiting", "gauge", "Signals of an input that are not taken yet.", kept),
     ];
     for (name, kind, help, value) in inputs {
         text.begin(name, kind, help);

@@ -313,14 +313,14 @@ fn listen_at_path(path: &Path) -> Result<Entrance, u8> {
         listener = std::fs::remove_file(path).and_then(|()| bind());
     }
     listener.map(Entrance::Unix).map_err(|error| {
-        complain(format_args!("nobody can attach at {}: {error}", path.display()));
+        complain(format_args!("cannot listen for operators at {}: {error}", path.display()));
         USAGE
     })
 }
 
 #[cfg(not(unix))]
 fn listen_at_path(path: &Path) -> Result<Entrance, u8> {
-    complain(format_args!("nobody can attach at {}: expected a port such as 4005", path.display()));
+    complain(format_args!("cannot listen for operators at {}: expected a port such as 4005", path.display()));
     Err(USAGE)
 }
 
@@ -338,7 +338,7 @@ fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), u8> {
         Ok((listener, address))
     });
     listener.map_err(|error| {
-        complain(format_args!("nobody can connect at {address}: {error}"));
+        complain(format_args!("cannot listen at {address}: {error}"));
         USAGE
     })
 }

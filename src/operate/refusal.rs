@@ -96,20 +96,20 @@ pub(super) enum NeededArgument {
 impl fmt::Display for OperatorRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            OperatorRefusal::UnknownRequest(name) => write!(f, "`{name}` is no request of a session"),
-            OperatorRefusal::UnknownAction => f.write_str("there is no such action"),
+            OperatorRefusal::UnknownRequest(name) => write!(f, "`{name}` is not a request of a session"),
+            OperatorRefusal::UnknownAction => f.write_str("unknown action"),
             OperatorRefusal::Role { request, needed, held } => {
                 write!(f, "`{request}` needs the role {needed}, and this session has {held}")
             }
-            OperatorRefusal::LooksOnly => f.write_str("this session may only look"),
+            OperatorRefusal::LooksOnly => f.write_str("this session may only survey the run"),
             OperatorRefusal::Argument { request, needed } => write!(f, "`{request}` needs {needed}"),
             OperatorRefusal::NoNumber => f.write_str("it needs the number of a task"),
             OperatorRefusal::Wraps { request, only } => {
                 write!(f, "`{request}` is a request only for `{only}`")
             }
-            OperatorRefusal::NotData { text, reason } => write!(f, "`{text}` is no data: {reason}"),
-            OperatorRefusal::NoRow(row) => write!(f, "there is no row {row} in the table of tasks"),
-            OperatorRefusal::NoTask(number) => write!(f, "there is no task {number}"),
+            OperatorRefusal::NotData { text, reason } => write!(f, "`{text}` is not data: {reason}"),
+            OperatorRefusal::NoRow(row) => write!(f, "row {row} of the table of tasks does not exist"),
+            OperatorRefusal::NoTask(number) => write!(f, "task {number} does not exist"),
             OperatorRefusal::TooManySessions { role, most } => {
                 write!(
                     f,

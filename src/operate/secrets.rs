@@ -63,13 +63,13 @@ impl fmt::Display for SecretsError {
             SecretsError::NoRandom(error) => error.fmt(f),
             SecretsError::Unreadable(error) => error.fmt(f),
             #[cfg(unix)]
-            SecretsError::Exposed => f.write_str("others may read or write it: use chmod 600"),
+            SecretsError::Exposed => f.write_str("other users may read or write it: run chmod 600 on it"),
             SecretsError::NoRole(line) => {
                 write!(f, "line {line} has no role: expected `observe`, `command` or `patch`, and a secret")
             }
             SecretsError::NotGood(line) => write!(
                 f,
-                "the secret in line {line} is not good: expected {SHORTEST} to {LONGEST} letters, digits and signs"
+                "invalid secret in line {line}: expected {SHORTEST} to {LONGEST} letters, digits and signs"
             ),
             SecretsError::Repeated(line) => {
                 write!(f, "the secret in line {line} is that of another role")
@@ -196,7 +196,7 @@ mod tests {
             ("", "no secrets"),
             ("root 0123456789abcdef", "line 1 has no role"),
             ("observe", "line 1 has no role"),
-            ("\nobserve short", "line 2 is not good"),
+            ("\nobserve short", "invalid secret in line 2"),
             ("observe 0123456789abcdef\npatch 0123456789abcdef", "another role"),
         ] {
             let found = Secrets::parse(text).err().map(|error| error.to_string()).unwrap_or_default();

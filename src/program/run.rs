@@ -258,7 +258,7 @@ pub(crate) fn end_rest(machine: &mut Vm) {
     machine.flush();
     if !left.is_empty() {
         let lines: Vec<String> = left.iter().map(|left| format!("  {left}\n")).collect();
-        machine.complain(&format!("The end of the run was cut short. Left are\n{}", lines.concat()));
+        machine.complain(&format!("The end of the run was cut short. Unfinished tasks:\n{}", lines.concat()));
     }
 }
 

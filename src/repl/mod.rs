@@ -102,7 +102,7 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
     program::set_module_path(&mut machine, path).map_err(setup)?;
     machine.complain_to(Output::Standard);
     let typing = Typing::begin(is_interactive, screen, machine.inbox()).map_err(|error| {
-        complain(format_args!("no thread can be made to read standard input: {error}"));
+        complain(format_args!("cannot start the thread that reads standard input: {error}"));
         USAGE
     })?;
     let lines = typing.other_lines();
@@ -322,7 +322,7 @@ impl Repl {
             None if number.is_empty() => {
                 println!("; `:abort` needs the number of a task, which `:tasks` shows");
             }
-            None => println!("; there is no task {number}; `:tasks` shows their numbers"),
+            None => println!("; task {number} does not exist; `:tasks` shows their numbers"),
         }
     }
 

@@ -26,16 +26,18 @@ impl fmt::Display for AttachError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             AttachError::Unreachable(address, error) => {
-                write!(f, "no run can be reached at {address}: {error}")
+                write!(f, "cannot reach a run at {address}: {error}")
             }
             AttachError::NoSecret => {
                 write!(f, "a port asks for a secret: use --secret-file, or the environment variable {SECRET}")
             }
             AttachError::SecretFile(file, error) => write!(f, "{}: {error}", file.display()),
             AttachError::NoReader(error) => {
-                write!(f, "no thread can be made to read standard input: {error}")
+                write!(f, "cannot start the thread that reads standard input: {error}")
             }
-            AttachError::NoHearer(error) => write!(f, "no thread can be made to hear the run: {error}"),
+            AttachError::NoHearer(error) => {
+                write!(f, "cannot start the thread that reads from the run: {error}")
+            }
             AttachError::Connection(error) => error.fmt(f),
         }
     }
@@ -62,10 +64,10 @@ impl fmt::Display for RequestRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             RequestRefusal::ByRun(text) | RequestRefusal::NoCommand(text) => f.write_str(text),
-            RequestRefusal::NotAnAnswer => f.write_str("it is no answer"),
+            RequestRefusal::NotAnAnswer => f.write_str("it is not an answer"),
             RequestRefusal::Needs(command, needed) => write!(f, "`{command}` needs {needed}"),
             RequestRefusal::Unreadable(file, reason) => write!(f, "{file} cannot be read: {reason}"),
-            RequestRefusal::NoPatch => f.write_str("there is no patch to be undone"),
+            RequestRefusal::NoPatch => f.write_str("no patch can be undone"),
         }
     }
 }

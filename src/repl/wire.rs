@@ -87,7 +87,7 @@ impl Wire {
             #[cfg(unix)]
             AttachSecurity::Tls(ca_file) => secured(stream, &address, ca_file).map(Wire::Secured),
             #[cfg(not(unix))]
-            AttachSecurity::Tls(_) => Err(io::Error::other("there is no TLS here: use ssh -L")),
+            AttachSecurity::Tls(_) => Err(io::Error::other("TLS is not available here: use ssh -L")),
         }
     }
 

@@ -409,7 +409,7 @@ impl Debugger {
             machine.find_task(task)
         };
         let Some(number) = found else {
-            return Ok(format!("There is no task `{task}` here; `tasks` lists them.\n"));
+            return Ok(format!("Unknown task `{task}`; `tasks` lists them.\n"));
         };
         let mut text = format!("{}\n", machine.task_name(number).unwrap_or_default());
         for frame in machine.frames_of(number, 100) {
@@ -443,7 +443,7 @@ impl Debugger {
             .import(&Datum::string(text, Default::default()))
             .ok()
             .and_then(|text| machine.spawn_library("%REPL-EVALUATE", &[text]).ok());
-        let Some(task) = task else { return Ok("There is no memory left for it.\n".into()) };
+        let Some(task) = task else { return Ok("Not enough memory for it.\n".into()) };
         // The schedule of a run does not cover the choices of the form.
         machine.end_following();
         let outcome = machine.run_until(Some(task), FORM_TICKS);

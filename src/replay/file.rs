@@ -130,7 +130,7 @@ pub enum RecordedError {
 impl fmt::Display for RecordedError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            RecordedError::NotOne => f.write_str("it is no recording of a run"),
+            RecordedError::NotOne => f.write_str("it is not a recording of a run"),
             RecordedError::Format(version) => {
                 write!(f, "it has version {version} of the format; this machine reads version {FORMAT}")
             }

@@ -142,7 +142,7 @@ impl Rerun {
         let (_, equal) = host.checks();
         let last = match equal {
             Some(check) => format!("the last equal check is at tick {}", check.ticks),
-            None => "there is no equal check before it".into(),
+            None => "no equal check precedes it".into(),
         };
         let record = host.replayed() + 1;
         match (host.asked_at_end(), ended, self.recorded.end) {

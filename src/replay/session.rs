@@ -143,7 +143,7 @@ impl Session {
                     self.say_where()?;
                 }
                 None => {
-                    println!("There is no breakpoint before: this is the beginning.");
+                    println!("No breakpoint before this place: this is the beginning.");
                     self.say_where()?;
                 }
             },
@@ -173,8 +173,8 @@ impl Session {
             "quit" | "q" | "exit" => return Ok(false),
             "help" => print!("{}", help(COMMANDS)),
             _ => match nearest(command, COMMANDS) {
-                Some(name) => println!("There is no command `{command}`; did you mean `{name}`?"),
-                None => println!("There is no command `{command}`; `help` lists them."),
+                Some(name) => println!("Unknown command `{command}`; did you mean `{name}`?"),
+                None => println!("Unknown command `{command}`; `help` lists them."),
             },
         }
         Ok(true)

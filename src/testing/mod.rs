@@ -291,7 +291,7 @@ fn verdict(ended: Ended, output: impl FnOnce() -> String) -> Verdict {
         Ended::Failed => "a failure has left it".into(),
         Ended::HeapExhausted => "its memory is exhausted".into(),
         Ended::BudgetSpent => "its budget of ticks is spent; `--budget` raises it".into(),
-        Ended::Deadlocked => "it waits for what cannot come".into(),
+        Ended::Deadlocked => "it waits for an event that cannot occur".into(),
         Ended::Signalled(signal) => format!("it was ended by the signal {}", signal.number()),
     };
     Verdict::Failed { why, output: output() }

@@ -48,7 +48,7 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
     let expected = format!(
         "3\n(3 15)\n(MODE CALM)\nFailure :OOPS, no recovery available.\nAborted\nA failure of cause :OOPS with 1.\n  \
          in top level\nFailure :OOPS, no recovery available.\nAborted\n; 3 definitions are changed\n((:FAST 1) 7 1)\n\
-         ; 3 definitions are as before\n(3 3 NIL)\n; there is no patch to be undone\nno speed\n\
+         ; 3 definitions are as before\n(3 3 NIL)\n; no patch can be undone\nno speed\n\
          Failure :SIMPLE-ERROR, no recovery available.\nAborted\nThe last form of {incomplete} is incomplete.\n\
          Failure :PROGRAM-ERROR, no recovery available.\nAborted\n\
          A patch consists of DEFUN, DEFMACRO, DEFMETHOD, DEFGENERIC, DEFVAR, DEFPARAMETER, SETQ, DEFTYPE, \
@@ -59,7 +59,7 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
          The value \"crater\" is not of type LIST.\nFailure :TYPE-ERROR, no recovery available.\nAborted\n\
          The value \"crater\" is not of type LIST.\n  in LOOK\n      WHERE = \"crater\"\n  in top level\n\
          Failure :TYPE-ERROR, no recovery available.\nAborted\n\
-         ; /no/such/file cannot be read: No such file or directory (os error 2)\n; there is no task 9999\n\
+         ; /no/such/file cannot be read: No such file or directory (os error 2)\n; task 9999 does not exist\n\
          ; `:abort` needs the number of a task, which `:tasks` shows\nhalf\nNIL\n"
     );
     assert_eq!((output, status), (expected, Some(0)));
@@ -76,7 +76,7 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
     );
     assert!(!std::path::Path::new(&socket).exists());
     let (output, status) = session(&socket, "");
-    assert!(output.starts_with(&format!("eslvm: no run can be reached at {socket}")), "{output}");
+    assert!(output.starts_with(&format!("eslvm: cannot reach a run at {socket}")), "{output}");
     assert_eq!(status, Some(2));
 }
 
@@ -435,8 +435,8 @@ fn bad_options_are_refused() {
     std::fs::set_permissions(&open, std::fs::Permissions::from_mode(0o644)).expect("it can be set");
     for (options, said) in [
         (&["--listen", "0.0.0.0:0"][..], "eslvm: others could hear what is said at 0.0.0.0:0"),
-        (&["--listen", "0", "--secrets", &open], &format!("eslvm: {open}: others may read or write it")),
-        (&["--listen", "/no/such/folder/s"], "eslvm: nobody can attach at /no/such/folder/s"),
+        (&["--listen", "0", "--secrets", &open], &format!("eslvm: {open}: other users may read or write it")),
+        (&["--listen", "/no/such/folder/s"], "eslvm: cannot listen for operators at /no/such/folder/s"),
     ] {
         let mut run = Operated::start(&folder, "(print 1)", options);
         run.said(said);

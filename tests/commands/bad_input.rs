@@ -98,7 +98,7 @@ fn files_that_cannot_be_read() {
         check(
             &run(&mut command(program, &[action, &missing]), b""),
             2,
-            "cannot be read: there is no such file",
+            "cannot be read: the file does not exist",
         );
         // A folder is checked with all that is in it.
         if action != "check" {
@@ -144,7 +144,7 @@ fn wrong_command_lines() {
     ] {
         check(&run(&mut eslvm(arguments), b""), 2, message);
     }
-    check(&run(&mut eslc(&["compile", "-"]), b"(print 1)"), 2, "say with -o where it goes");
+    check(&run(&mut eslc(&["compile", "-"]), b"(print 1)"), 2, "name the output with -o");
     let done = run(&mut eslc(&["format", "--messages", "json", "x.esl"]), b"");
     check(&done, 2, "unexpected argument '--messages'");
     assert_eq!(run(&mut eslvm(&["--help"]), b"").status, Some(0));
@@ -285,7 +285,7 @@ fn no_command_writes_over_what_it_reads() {
     let message = "is read and cannot be written";
     let indirect = path("../overwrite/program.esl");
     check(&run(&mut eslc(&["compile", &program, "-o", &program]), b""), 2, message);
-    check(&run(&mut eslc(&["compile", &program, "-o", &part]), b""), 2, "is a source by its name");
+    check(&run(&mut eslc(&["compile", &program, "-o", &part]), b""), 2, "has the name of a source");
     if std::fs::exists(&indirect).expect("the folder can be read") {
         check(&run(&mut eslc(&["compile", &program, "-o", &indirect]), b""), 2, message);
     }
@@ -293,7 +293,7 @@ fn no_command_writes_over_what_it_reads() {
     std::fs::hard_link(&program, &link).expect("the folder takes links");
     check(&run(&mut eslc(&["compile", &program, "-o", &link]), b""), 2, message);
     // Other sources are not lost either.
-    let (other, message) = (path("other.lisp"), "other.lisp is there already, and is a source by its name");
+    let (other, message) = (path("other.lisp"), "other.lisp exists and has the name of a source");
     std::fs::write(&other, text).expect("the folder can be written");
     check(&run(&mut eslc(&["compile", &program, "-o", &other]), b""), 2, message);
     check(&run(&mut eslvm(&["test", "--junit", &other, &program]), b""), 2, message);

@@ -54,7 +54,7 @@ fn a_schedule_is_of_one_program() {
     let (status, _, errors) = run(&folder, &["run", "--schedule", "no.schedule", "lost.esl"]);
     assert_eq!(status, Some(2));
     assert!(
-        errors.contains("no.schedule is no schedule: its first line is not `esl-schedule 2`"),
+        errors.contains("no.schedule is not a schedule: its first line is not `esl-schedule 2`"),
         "{errors}"
     );
 }
@@ -259,7 +259,7 @@ fn a_lost_update_of_a_variable_is_found_by_default() {
     }
     let variables = "changes of special variables (count.esl:3:";
     for (grain, what) in
-        [("changes", format!("what tasks look at, {variables}")), ("reads", variables.into())]
+        [("changes", format!("data that tasks read, {variables}")), ("reads", variables.into())]
     {
         let (status, output, errors) = run(&folder, &["explore", "--grain", grain, "count.esl"]);
         assert_eq!((status, errors.as_str()), (Some(7), ""), "{output}");

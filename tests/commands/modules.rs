@@ -150,7 +150,7 @@ fn a_module_that_is_not_found_is_reported() {
     let (status, output, errors) = folder.run(ESLVM, &["run", "main.eslb"], "");
     assert_eq!((status, &*output), (1, "BEFORE"));
     assert!(
-        errors.starts_with("There is no module shapes: found no file shapes.esl or shapes.eslb in ."),
+        errors.starts_with("The module shapes is missing: found neither shapes.esl nor shapes.eslb in ."),
         "{errors}"
     );
     assert!(errors.contains("main.esl:3:1"), "{errors}");

@@ -158,6 +158,6 @@ fn an_address_that_cannot_be_had_is_refused() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("there is a port");
     let address = taken.local_addr().expect("it has one").to_string();
     let mut run = Operated::start(&folder, "(print 1)", &["--metrics", &address]);
-    run.said(&format!("eslvm: nobody can connect at {address}: "));
+    run.said(&format!("eslvm: cannot listen at {address}: "));
     assert_eq!(run.end(), Some(2));
 }

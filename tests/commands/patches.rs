@@ -67,7 +67,7 @@ fn a_patch_of_kinds_and_shared_things_is_made_and_undone_in_one_step() {
         "(3 NIL 7 10)\n; 14 definitions are changed\n(1 99 3 50 2 :HELD HERE 5 0 3 NIL 10)\n\
          The structure WHEEL keeps its slots, (SIZE): a structure with others needs another name.\n{refused}\
          +LIMIT+ is a constant already, with the value 5.\n{refused}\
-         Expected the head of a rule, which is no property, found (PLACE ?X ?Y).\n{refused}The value 1 is not of type LIST.\n{wrong}50\n\
+         Expected the head of a rule, which is not a property, found (PLACE ?X ?Y).\n{refused}The value 1 is not of type LIST.\n{wrong}50\n\
          ; 14 definitions are as before\n(3 NIL 7 10)\n(NIL NIL NIL NIL NIL)"
     );
     assert_eq!(lines.join("\n"), expected);
@@ -154,7 +154,7 @@ T
 (4 HUB)
 :OTHER
 (2 0)
-There is no input or event in a variable OTHERS.
+The variable OTHERS holds neither an input nor an event.
 Failure :PROGRAM-ERROR, no recovery available.
 Aborted
 T
@@ -223,6 +223,6 @@ fn a_patch_of_other_definitions_is_undone_as_a_whole() {
     assert_eq!(output.matches(after).count(), 2, "{output}");
     assert_eq!(output.matches(before).count(), 2, "{output}");
     assert_eq!(lines.iter().filter(|line| line.contains(":NO-APPLICABLE-METHOD")).count(), 2, "{output}");
-    assert!(output.ends_with("T\n; there is no patch to be undone\n"), "{output}");
+    assert!(output.ends_with("T\n; no patch can be undone\n"), "{output}");
     assert_eq!(run.end(), Some(0));
 }

@@ -200,7 +200,7 @@ fn a_replay_that_diverges_says_where_and_has_a_status_of_its_own() {
     for (path, status, message) in [
         (&*damaged, 3, "damaged.eslj cannot be replayed: it is damaged at byte 12"),
         (&*older, 6, "older.eslj cannot be replayed: it has version 1 of the format; this machine reads"),
-        (&*folder.file("text", "(print 1)"), 3, "it is no recording of a run"),
+        (&*folder.file("text", "(print 1)"), 3, "it is not a recording of a run"),
         ("no-such-file", 2, "no-such-file cannot be read"),
     ] {
         let again = replay(&[path], "");
@@ -300,9 +300,9 @@ fn mistakes_in_commands_are_answered() {
     let run = replay(&["--until", "tick:50", &recording], input);
     assert_eq!((run.status, &*run.errors), (Some(0), ""), "{}", run.output);
     for expected in [
-        "There is no command `fly`",
+        "Unknown command `fly`",
         "Expected a number of ticks",
-        "There is no task `nobody`",
+        "Unknown task `nobody`",
         "Expected a form",
         "The value 5 is not of type LIST",
         "The form is not whole",

@@ -106,7 +106,8 @@ fn the_repl_has_the_same_flags() {
         process::run(command.current_dir(folder.path().join("work")), input).output
     };
     let refused = ask(&[]);
-    let report = "There is no right to read \"../other/secret\": --allow-read=../other/secret grants it.";
+    let report =
+        "Read access to \"../other/secret\" is not permitted; run with --allow-read=../other/secret.";
     assert!(refused.contains(report), "{refused}");
     assert!(ask(&["--allow-read=../other"]).contains("\"5\""));
 }
@@ -143,7 +144,8 @@ fn a_session_of_an_operator_has_the_same_flags() {
     assert_eq!(ask(&["--allow-read=../other"], &narrowed), format!("(:READ {secret:?} NIL)\n"));
     // A session has no right that the run lacks.
     assert!(
-        ask(&["--allow-all"], "(probe-file \"/etc/passwd\")").contains("--allow-read=/etc/passwd grants it.")
+        ask(&["--allow-all"], "(probe-file \"/etc/passwd\")")
+            .contains("is not permitted; run with --allow-read=/etc/passwd.")
     );
     // Files below the folder of the run need no flag, and the session starts only with flags that parse.
     assert_eq!(ask(&[], "(and (probe-file \"own\") t)"), "T\n");

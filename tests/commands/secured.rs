@@ -72,7 +72,7 @@ fn operators_and_figures_are_reached_over_tls() {
     let attached = attach(&["--ca-file", &authority]);
     assert_eq!(
         (attached.output.as_str(), attached.status),
-        ("(3 3)\nThere are no relations, locks or inputs.\n", Some(0)),
+        ("(3 3)\nNo relations, locks or inputs.\n", Some(0)),
         "{}",
         attached.errors
     );

@@ -155,7 +155,7 @@ fn a_client_evaluates_looks_up_and_compiles() {
         ("(swank:set-package \"esl-user\")", "(:ok (\"ESL-USER\" \"ESL-USER\"))"),
         ("(swank:buffer-first-change \"x\")", "(:ok nil)"),
         ("(swank:interactive-eval \"(+ 1\")", "(:abort \"The last form is incomplete.\")"),
-        ("(swank:quit-lisp)", "(:abort \"`swank:quit-lisp` is no request of a session\")"),
+        ("(swank:quit-lisp)", "(:abort \"`swank:quit-lisp` is not a request of a session\")"),
         ("(swank:operator-arglist)", "(:abort \""),
     ] {
         let said = client.ask(form);
@@ -203,7 +203,7 @@ fn a_client_evaluates_looks_up_and_compiles() {
     let row = tasks.split("\") (").position(|row| row.contains("IDLER")).expect("it is there");
     assert_eq!(client.ask(&format!("(cl:mapc 'swank:kill-nth-thread '({row}))")), "(:ok t)");
     assert!(client.ask("(cl:mapc 'print '(1))").starts_with("(:abort \"`cl:mapc` is a request only "));
-    assert!(client.ask("(swank:kill-nth-thread 99)").starts_with("(:abort \"there is no row 99 "));
+    assert!(client.ask("(swank:kill-nth-thread 99)").starts_with("(:abort \"row 99 of "));
     client.wait_for_end_of("idler");
     assert!(!client.ask("(swank:list-threads)").contains("IDLER"));
     // A hanging call is aborted.
@@ -230,7 +230,7 @@ fn a_failure_waits_for_who_debugs_it() {
     let file = folder.join("program.esl");
     let start = format!(
         "{thread} 1 (\"A failure of cause :STUCK with 5.\" \"   [cause :STUCK]\" nil) \
-         ((\"USE-VALUE\" \"Return a value in place of what failed.\") \
+         ((\"USE-VALUE\" \"Return a value in place of the failed operation.\") \
          (\"ABORT\" \"End the task with its failure.\")) ((0 \"STUMBLE at {file}:7:8\") (1 "
     );
     assert!(debug.starts_with(&start), "{debug}\n{start}");
@@ -251,7 +251,11 @@ fn a_failure_waits_for_who_debugs_it() {
         "(:ok \"=> 3\")"
     );
     assert!(client.ask_about("(swank:inspect-current-condition)", &thread).contains("STUCK"));
-    assert!(client.ask_about("(swank:invoke-nth-restart-for-emacs 1 9)", &thread).contains("no restart 9"));
+    assert!(
+        client
+            .ask_about("(swank:invoke-nth-restart-for-emacs 1 9)", &thread)
+            .contains("Restart 9 does not exist")
+    );
     // A value in the place of what has failed: the task goes on with it.
     let left = client.ask_about("(swank:invoke-nth-restart-for-emacs 1 0)", &thread);
     assert_eq!(left, "(:abort \"the task has left\")");
@@ -279,7 +283,7 @@ fn a_failure_waits_for_who_debugs_it() {
     let answer = client.answer(fails);
     assert!(answer.starts_with("(:abort \"") && answer.contains("LIST"), "{answer}");
     // Questions that are no evaluations are not debugged.
-    assert_eq!(client.ask("(swank:inspect-nth-part 99)"), "(:abort \"There is no part 99.\")");
+    assert_eq!(client.ask("(swank:inspect-nth-part 99)"), "(:abort \"Part 99 does not exist.\")");
     // When the session ends, what it debugs ends with its failure.
     client.ask("(swank:interactive-eval \"(signal *go*)\")");
     client.wait("(:debug ");

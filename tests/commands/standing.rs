@@ -117,7 +117,7 @@ fn tasks_stand_still_go_on_and_end() {
         .types("(progn (loop while (find 'counter (list-tasks) :key #'task-name) do (sleep 0.001)) :ended)");
     operator.hears_of(":ENDED");
     operator.types(&format!(":bt {number}"));
-    operator.hears_of(&format!("there is no task {number}"));
+    operator.hears_of(&format!("task {number} does not exist"));
     assert_eq!(operator.leaves(), Some(0));
     assert_eq!(run.finish().output, "CALM\n");
 }
@@ -140,7 +140,7 @@ fn many_facts_are_shown_by_pages() {
         // A mistake in a command is reported in the words of that command.
         (":bt two", 1, "; `:bt` needs the number of a task, which `:tasks` shows, or nothing"),
         (":resume", 1, "; `:resume` needs the number of a task, which `:tasks` shows"),
-        (":suspend 99", 1, "; there is no task 99"),
+        (":suspend 99", 1, "; task 99 does not exist"),
         (":watch", 1, "; `:watch` needs a form"),
         (":patch", 1, "; `:patch` needs the path of a file"),
     ] {

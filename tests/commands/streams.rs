@@ -278,7 +278,7 @@ fn files_are_read_and_written_in_parts() {
         ":END",
         "100000",
         "T",
-        "\"The file \\\"none\\\": it cannot be read: there is no such file.\"",
+        "\"The file \\\"none\\\": it cannot be read: the file does not exist.\"",
         "\"The file \\\".\\\": it cannot be read: it is a directory.\"",
         "NIL",
         ":END",

@@ -144,7 +144,7 @@ fn a_word_is_completed() {
     write("(my-o\t)\r");
     output.await_text("1");
     write(":tas\t\r");
-    output.await_text("There are no tasks.");
+    output.await_text("No tasks.");
     write("help\r");
     output.await_text(":load FILE");
     write("exit\r");
@@ -164,7 +164,7 @@ fn sessions_elsewhere_are_edited_too() {
     person.write_all(b"(list (drive-h\t))\r").expect("it is read");
     output.await_text("(7)");
     person.write_all(b":undo\t\r").expect("it is read");
-    output.await_text("; there is no patch to be undone");
+    output.await_text("; no patch can be undone");
     // Before the next line is asked for, the terminal itself takes Ctrl-D for the end of an empty input.
     output.await_text("? ");
     person.write_all(b"\x04").expect("it is read");
@@ -176,7 +176,7 @@ fn sessions_elsewhere_are_edited_too() {
     person.write_all(b"whe\t\r").expect("it is read");
     output.await_text(": between two turns");
     person.write_all(b"stpe\r").expect("it is read");
-    output.await_text("There is no command `stpe`; did you mean `step`?");
+    output.await_text("Unknown command `stpe`; did you mean `step`?");
     output.await_text("(replay) ");
     person.write_all(b"\x04").expect("it is read");
     assert_eq!(status(&mut child), Some(0));

@@ -50,7 +50,7 @@ fn failures_are_shown_with_what_repeats_them() {
         "  passed  EXPECTED\n",
         "  FAILED  OTHER-FAILURE, seed 0: a check did not hold\n          A failure :LOST was expected",
         "  FAILED  UNLUCKY, seed ",
-        "  FAILED  WAITING, seed 0: it waits for what cannot come\n          Deadlock:",
+        "  FAILED  WAITING, seed 0: it waits for an event that cannot occur\n          Deadlock:",
         "  FAILED  LEAVING, seed 0: it has ended the run with the status 7\n",
         "  FAILED  RACING: under a schedule, a check did not hold (grain variables, timers idle; ",
         "  passed  LEFT-BEHIND\n",

@@ -134,7 +134,7 @@ fn a_second_interrupt_cuts_the_end_short_and_names_what_is_left() {
     running.send("-INT");
     let ended = running.end();
     assert_eq!(ended.status, Some(143), "{}", ended.errors);
-    assert!(ended.errors.contains("Left are\n"), "{}", ended.errors);
+    assert!(ended.errors.contains("Unfinished tasks:\n"), "{}", ended.errors);
     assert!(ended.errors.contains("  task ARM, in a cleanup, "), "{}", ended.errors);
 }
 
@@ -165,7 +165,7 @@ fn the_end_of_a_run_has_the_time_that_is_given() {
     let arguments = ["run", "--clock", "virtual", "--cleanup-time", "5", "--budget", "100000", &path];
     let run = process::run(&mut eslvm(&arguments), "");
     assert_eq!((run.status, &*run.output), (Some(5), ""), "{}", run.errors);
-    assert!(run.errors.contains("A cleanup of task ARM takes too long and is left."), "{}", run.errors);
+    assert!(run.errors.contains("A cleanup of task ARM takes too long and is cut off."), "{}", run.errors);
 }
 
 #[test]
@@ -327,7 +327,7 @@ fn the_limits_of_a_run_hold_for_its_compilation() {
     let hoarding = "(defmacro m () (let ((hoard nil)) (loop (push (make-array 1000) hoard))))\n(m)";
     let looping = "(eval-when (:compile-toplevel) (loop))";
     for (name, text, option, value, status, said) in [
-        ("loop.esl", looping, "--budget", "30000000", 5, "more than the budget"),
+        ("loop.esl", looping, "--budget", "30000000", 5, "exceeds the budget"),
         ("hoard.esl", hoarding, "--memory", "48M", 3, "memory"),
         ("endless.esl", endless, "--budget", "1000000000", 3, "nested-too-deeply"),
     ] {

@@ -38,7 +38,7 @@ pub use crate::outside::{DataFunction, HostFunction, Need};
 pub enum LibraryError {
     /// The library has no function of this name.
     Missing(String),
-    /// There is no memory left for it.
+    /// Not enough memory for it.
     NoMemory,
 }
 
@@ -46,7 +46,7 @@ impl fmt::Display for LibraryError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             LibraryError::Missing(name) => write!(f, "the library has no function {name}"),
-            LibraryError::NoMemory => f.write_str("there is no memory left for a task"),
+            LibraryError::NoMemory => f.write_str("not enough memory for a task"),
         }
     }
 }

@@ -197,19 +197,21 @@ impl fmt::Display for Fault {
             Fault::TypeCode(code) => write!(f, "no type code has the number {code}"),
             Fault::Builtin(number) => write!(f, "no builtin has the number {number}"),
             Fault::Arguments(count) => write!(f, "what is called does not take {count} arguments"),
-            Fault::Want(want) => write!(f, "{want} is no number of values to want"),
-            Fault::ThrowKind(kind) => write!(f, "{kind} is no kind of throw"),
+            Fault::Want(want) => write!(f, "invalid number of wanted values {want}"),
+            Fault::ThrowKind(kind) => write!(f, "unknown kind of throw {kind}"),
             Fault::Unassigned(register) => write!(f, "reads r{register}, which holds nothing on some path"),
             Fault::MaybeUnsupplied(register) => {
                 write!(f, "reads the parameter r{register} without a test whether it was supplied")
             }
-            Fault::NotParameter(register) => write!(f, "r{register} is no optional parameter to be tested"),
+            Fault::NotParameter(register) => {
+                write!(f, "r{register} is not an optional parameter, so it cannot be tested")
+            }
             Fault::NotBox(register) => write!(f, "expected a box in r{register}"),
             Fault::Box(register) => write!(f, "expected an object in r{register}, found a box"),
             Fault::CaptureKind(index) => {
                 write!(f, "capture #{index} is a box here and a value there")
             }
-            Fault::Capture(index) => write!(f, "there is no capture #{index}"),
+            Fault::Capture(index) => write!(f, "capture #{index} does not exist"),
             Fault::CaptureCount(found) => {
                 write!(f, "expected at most {MAX_CAPTURES} captures, found {found}")
             }
@@ -246,7 +248,7 @@ impl fmt::Display for Fault {
             Fault::Parameters(found) => {
                 write!(f, "the parameters take {found} registers, which the frame lacks")
             }
-            Fault::KeyName(PoolIdx(index)) => write!(f, "constant {index} names a key and is no symbol"),
+            Fault::KeyName(PoolIdx(index)) => write!(f, "constant {index} names a key and is not a symbol"),
             Fault::ToplevelParameters => f.write_str("the function takes arguments"),
             Fault::ToplevelCaptures => f.write_str("the function has captures"),
             Fault::StandardSymbol => f.write_str("`NIL` and `T` are constants of their own"),

@@ -87,7 +87,7 @@ impl Expander {
             // `(function f)` declares a function, and unused functions are not reported.
             body.ignored.extend(names.iter().filter_map(|name| name.as_symbol().cloned()));
         } else if !(symbol.is_in(CL_PACKAGE) || WITHOUT_EFFECT.contains(&symbol.name())) {
-            let message = format!("there is no declaration {}", name(symbol));
+            let message = format!("unknown declaration {}", name(symbol));
             let help = format!("a type is declared with `(type {} …)`", plain(symbol));
             self.report(code::UNKNOWN_DECLARATION.at(form.at(head.span()), message).help(help), origin);
         }

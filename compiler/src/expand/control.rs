@@ -298,7 +298,7 @@ fn unknown_block(expander: &Expander, form: &Form, block: &Symbol) -> Box<Diagno
         );
         return Box::new(diagnostic.help(help));
     }
-    let message = format!("there is no block called {} around this {}", name(block), name(&form.operator));
+    let message = format!("no block called {} encloses this {}", name(block), name(&form.operator));
     let named = form.args.first().map_or(form.span, Datum::span);
     let diagnostic = code::UNKNOWN_BLOCK.at(form.at(named), message);
     let mut around: Vec<String> = expander
@@ -371,7 +371,7 @@ pub(super) fn go(expander: &mut Expander, _: &mut dyn Environment, form: Form, t
             Ok(())
         }
         Visible::OutOfReach | Visible::No => {
-            let message = format!("there is no tag {} around this `go`", quoted(&form.args[0]));
+            let message = format!("no `tagbody` around this `go` has the tag {}", quoted(&form.args[0]));
             Err(Box::new(code::UNKNOWN_TAG.at(form.at(form.args[0].span()), message)))
         }
     }

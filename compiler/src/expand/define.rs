@@ -248,7 +248,7 @@ pub(super) fn package_change(environment: &mut dyn Environment, form: &Form) -> 
     };
     // Looking up any name in the package shows whether the package exists.
     if let Err(InternError::NoPackage(_)) = environment.intern(Some(&named), "NIL", false) {
-        let message = format!("there is no package called {}", quoted(&form.args[0]));
+        let message = format!("the package {} does not exist", quoted(&form.args[0]));
         return Err(Box::new(code::UNKNOWN_PACKAGE.at(form.at(form.args[0].span()), message)));
     }
     let package = make.call_cl("FIND-PACKAGE", [Datum::string(&named, form.span)]);

@@ -176,7 +176,7 @@ impl Parser {
                 return Err(self.wrong(item, &message).with_order(self.kind));
             }
             _ => {
-                let message = format!("there is no lambda list keyword `{}`", plain(keyword));
+                let message = format!("unknown lambda list keyword `{}`", plain(keyword));
                 return Err(self.wrong(item, &message).with_order(self.kind));
             }
         };

@@ -183,7 +183,7 @@ impl<'a> DatumBuilder<'a> {
                 let fault = code::UNKNOWN_PACKAGE.at(span, message);
                 self.fail(match &*package {
                     "QL" | "QUICKLISP" | "ASDF" | "UIOP" => fault.help(
-                        "there are no Quicklisp and ASDF: copy the library's files beside the program, and write \
+                        "ESL has neither Quicklisp nor ASDF: copy the library's files beside the program, and write \
                          `(require \"NAME\")` for `NAME.esl`",
                     ),
                     _ => fault,

@@ -42,7 +42,7 @@ impl fmt::Display for Divergence {
         )?;
         match equal {
             Some(check) => write!(f, "; the last equal check is at tick {}", check.ticks),
-            None => write!(f, "; there is no equal check before it"),
+            None => write!(f, "; no equal check precedes it"),
         }
     }
 }

@@ -35,12 +35,11 @@ pub(crate) fn program(
     let compiled = compiling(file, is_quiet, compile);
     if let Some(ended) = compiled.stopped {
         match ended {
-            Ended::BudgetSpent => complain("compiling the program takes more than the budget"),
+            Ended::BudgetSpent => complain("compiling the program exceeds the budget"),
             Ended::Signalled(signal) => complain_of_signal(signal),
-            _ => complain(format_args!(
-                "compiling the program takes more than {} MiB of memory",
-                config.memory >> 20
-            )),
+            _ => {
+                complain(format_args!("compiling the program exceeds {} MiB of memory", config.memory >> 20))
+            }
         }
         return Err(command::exit_status(ended));
     }

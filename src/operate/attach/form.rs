@@ -83,7 +83,7 @@ impl WireForm {
         let mut parser = WireFormParser { rest: text, open: Vec::new() };
         let form = parser.form()?;
         parser.skip_space();
-        if parser.rest.is_empty() { Ok(form) } else { Err("there is something behind the form") }
+        if parser.rest.is_empty() { Ok(form) } else { Err("expected the end of the text after the form") }
     }
 }
 
@@ -131,7 +131,7 @@ impl WireFormParser<'_> {
                     self.rest = after;
                     match self.open.pop() {
                         Some(OpenWireForm::List(items)) => WireForm::List(items),
-                        _ => return Err("a parenthesis closes nothing"),
+                        _ => return Err("unmatched `)`"),
                     }
                 }
                 '"' => {

@@ -177,7 +177,7 @@ fn too_large(form: &WireForm) -> WireForm {
         Some([kind, _, number]) if kind.name().as_deref() == Some(":return") => {
             answer(Err(OperatorRefusal::AnswerTooLarge), number.clone())
         }
-        _ => written("; what was to be told is too large\n"),
+        _ => written("; the output is too large to be sent\n"),
     }
 }
 
@@ -415,7 +415,7 @@ async fn take_requests(
             }
             _ => {
                 let reason =
-                    WireForm::list([WireForm::symbol(":invalid"), WireForm::text("it is no request")]);
+                    WireForm::list([WireForm::symbol(":invalid"), WireForm::text("it is not a request")]);
                 _ = outbox.send(&reason).await;
             }
         }

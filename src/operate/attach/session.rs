@@ -107,7 +107,7 @@ impl OperatorSession {
                 let survey = self.look(SurveyRequest { tasks: TASKS, ..SurveyRequest::default() }).await?;
                 let mut tree = survey.tree_text();
                 if tree.is_empty() {
-                    tree.push_str("There are no tasks.\n");
+                    tree.push_str("No tasks.\n");
                 }
                 if survey.has_more_tasks {
                     let all: u64 = survey.figures.tasks.iter().sum();
@@ -382,11 +382,7 @@ impl OperatorSession {
                 row.name, row.kept, row.capacity, row.signals, row.dropped
             );
         }
-        Ok(WireForm::Text(if text.is_empty() {
-            "There are no relations, locks or inputs.\n".into()
-        } else {
-            text
-        }))
+        Ok(WireForm::Text(if text.is_empty() { "No relations, locks or inputs.\n".into() } else { text }))
     }
 
     async fn failures(&self) -> Result<WireForm, OperatorRefusal> {

@@ -77,7 +77,9 @@ pub(super) fn admit(secrets: &Secrets, scheme: &str, head: &Parts) -> Result<Adm
             let role = secrets.role_of(token.as_bytes()).ok_or(UNKNOWN)?;
             Ok(Admitted::Post { role, is_view: path == "/view" })
         }
-        (_, "/" | "/events" | "/view" | "/do") => Err((StatusCode::METHOD_NOT_ALLOWED, "not in this way\n")),
+        (_, "/" | "/events" | "/view" | "/do") => {
+            Err((StatusCode::METHOD_NOT_ALLOWED, "this method is not allowed\n"))
+        }
         _ => Err((StatusCode::NOT_FOUND, "the monitor is at /\n")),
     }
 }
@@ -104,7 +106,7 @@ fn parameter<'a>(query: &'a str, name: &str) -> &'a str {
 /// Why it is turned away.
 pub(super) fn wish(role: OperatorRole, is_view: bool, body: &[u8]) -> Result<Wish, Refusal> {
     let value: Value =
-        serde_json::from_slice(body).map_err(|_| (StatusCode::BAD_REQUEST, "the request is no JSON\n"))?;
+        serde_json::from_slice(body).map_err(|_| (StatusCode::BAD_REQUEST, "the request is not JSON\n"))?;
     if is_view {
         let text =
             |name: &str| value[name].as_str().unwrap_or_default().chars().take(200).collect::<String>();
@@ -122,7 +124,7 @@ pub(super) fn wish(role: OperatorRole, is_view: bool, body: &[u8]) -> Result<Wis
         return Ok(Wish::View { viewer: text("viewer"), view });
     }
     if role < OperatorRole::Command {
-        return Err((StatusCode::FORBIDDEN, "this token is for looking only\n"));
+        return Err((StatusCode::FORBIDDEN, "this token permits surveys only\n"));
     }
     Ok(Wish::Deed(deed(&value)))
 }

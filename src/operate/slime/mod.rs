@@ -173,7 +173,7 @@ pub(super) fn settle(form: &mut WireForm) {
         match std::path::absolute(Path::new(file)) {
             Ok(path) if path.is_file() => *file = path.to_string_lossy().into_owned(),
             _ => {
-                let reason = format!("there is no file {file} here");
+                let reason = format!("the file {file} does not exist here");
                 *form = WireForm::list([WireForm::symbol(":error"), WireForm::Text(reason)]);
             }
         }

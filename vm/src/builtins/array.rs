@@ -377,7 +377,7 @@ fn extended(vm: &mut Vm, array: Value, size: usize) -> Outcome {
 pub(super) fn vector_pop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (_, fill) = with_fill_pointer(vm, arguments[0])?;
     let Some(last) = fill.checked_sub(1) else {
-        return vm.exchange.raise(Raised::Simple("there is nothing left to pop".into()));
+        return vm.exchange.raise(Raised::Simple("the vector is empty, so nothing can be popped".into()));
     };
     let value = element(vm, arguments[0], last)?;
     vm.heap.array_set_fill(arguments[0], Value::index(last));

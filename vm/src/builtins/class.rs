@@ -27,7 +27,7 @@ fn expect_class(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
         return vm.exchange.type_error(v, "CLASS");
     }
     let name = vm.describe(v);
-    vm.exchange.program_error(format!("there is no structure or condition type {name}"))
+    vm.exchange.program_error(format!("the structure or condition type {name} does not exist"))
 }
 
 /// Returns the classes that the list `supers` holds or names, for a class that inherits from them.

@@ -149,7 +149,7 @@ fn answer(
             let usage = text_of(&vm.heap, usage);
             StepOutcome::Failed(CompileTimeFailure { report, usage, ..CompileTimeFailure::default() })
         }
-        _ => return vm.exchange.program_error(format!("{kind} is no outcome of a step")),
+        _ => return vm.exchange.program_error(format!("unknown outcome of a step: {kind}")),
     }))
 }
 
@@ -269,7 +269,7 @@ pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (id, mut job) = take_job(vm, arguments[0])?;
     let next = match &mut job {
         CompilerJob::Text(text) => begin_form(vm, text),
-        _ => vm.exchange.program_error("there are no forms in a compilation"),
+        _ => vm.exchange.program_error("expected the handle of a text, found that of a compilation"),
     };
     vm.compiler.put_back(id, job);
     next
@@ -286,7 +286,7 @@ pub(super) fn text_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             }
             rest.map_err(Exit::from)
         }
-        _ => vm.exchange.program_error("there are no forms in a compilation"),
+        _ => vm.exchange.program_error("expected the handle of a text, found that of a compilation"),
     };
     vm.compiler.put_back(id, job);
     rest
@@ -327,7 +327,7 @@ pub(super) fn compilation_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             }
             Err(exit) => Err(exit),
         },
-        _ => vm.exchange.program_error("a text is no compilation"),
+        _ => vm.exchange.program_error("expected the handle of a compilation, found that of a text"),
     };
     vm.compiler.put_back(id, job);
     recount(vm);

@@ -29,7 +29,7 @@ fn designated_package(vm: &mut Vm, v: Value) -> Result<PackageId, Exit> {
     match vm.names.packages().named(&name) {
         Some(package) => Ok(package),
         None => {
-            let text = format!("there is no package {name}");
+            let text = format!("the package {name} does not exist");
             vm.exchange.raise(Raised::Package(name, text))
         }
     }
@@ -61,7 +61,7 @@ fn named_symbols(vm: &mut Vm, v: Value) -> Result<Vec<Symbol>, Exit> {
             Some(symbol) => symbols.push(symbol),
             None if vm.names.is_symbol(&vm.heap, item) => {
                 let name = vm.describe(item);
-                return vm.exchange.program_error(format!("the symbol {name} belongs to no package"));
+                return vm.exchange.program_error(format!("the symbol {name} does not belong to a package"));
             }
             None => return vm.exchange.type_error(item, "SYMBOL"),
         }

@@ -56,7 +56,7 @@ impl fmt::Display for DatumError {
         match self {
             DatumError::Circular => f.write_str("the form contains itself, so it cannot be compiled"),
             DatumError::TooLarge => write!(f, "the form has more than {MAX_NODES} parts"),
-            DatumError::NoRoom(_) => f.write_str("there is no memory left to compile the form"),
+            DatumError::NoRoom(_) => f.write_str("not enough memory to compile the form"),
         }
     }
 }

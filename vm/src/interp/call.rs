@@ -329,6 +329,6 @@ impl Vm {
                 return Ok(symbol);
             }
         }
-        self.exchange.program_error(format!("{} has too much to do at once", builtin.name))
+        self.exchange.program_error(format!("{} exceeds the work of one call", builtin.name))
     }
 }

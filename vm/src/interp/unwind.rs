@@ -240,7 +240,7 @@ pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
                 0 if is_state.is_some_and(|&first| vm.heap.is(first, Kind::Function)) => {
                     "the form of this RETRY or ABORT has been left"
                 }
-                0 => "there is no catch for the tag of this THROW",
+                0 => "no CATCH has the tag of this THROW",
                 1 => "the block of this RETURN-FROM has been left",
                 _ => "the tagbody of this GO has been left",
             };

@@ -92,7 +92,7 @@ impl Vm {
             text.push_str(&row_of(self, tasks[*position], &owners).line(*depth));
         }
         if tasks.is_empty() {
-            text.push_str("There are no tasks.\n");
+            text.push_str("No tasks.\n");
         } else if tasks.len() > SHOWN_IN_TREE {
             text.push_str(&format!("and {} more\n", tasks.len() - SHOWN_IN_TREE));
         }

@@ -148,7 +148,7 @@ fn handle_signal(vm: &mut Vm, function: Value) {
     let options = SpawnOptions { name: vm.names.known.on_signal, ..SpawnOptions::default() };
     let start = |vm: &mut Vm| make_task(vm, function, Value::NIL, options).map(|_| Value::T);
     if allocate_without_retry(vm, start).is_nil() {
-        vm.outside.complain("There is no memory left for the task that handles a signal.\n");
+        vm.outside.complain("Not enough memory for the task that handles a signal.\n");
     }
 }
 

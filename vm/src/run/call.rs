@@ -51,7 +51,7 @@ pub enum CallError {
     TicksUsed(u64),
     /// The embedder has stopped the run.
     Stopped,
-    /// There is no memory left for a task.
+    /// Not enough memory for a task.
     NoMemory,
 }
 
@@ -60,11 +60,11 @@ impl fmt::Display for CallError {
         match self {
             CallError::Failed { message, .. } => f.write_str(message),
             CallError::Aborted => f.write_str("it was aborted"),
-            CallError::Deadlocked => f.write_str("it waits for what cannot come"),
+            CallError::Deadlocked => f.write_str("it waits for an event that cannot occur"),
             CallError::BudgetSpent => f.write_str("the budget of the run is spent"),
             CallError::TicksUsed(ticks) => write!(f, "it did not end within {ticks} ticks"),
             CallError::Stopped => f.write_str("the run was stopped"),
-            CallError::NoMemory => f.write_str("there is no memory left for a task"),
+            CallError::NoMemory => f.write_str("not enough memory for a task"),
         }
     }
 }

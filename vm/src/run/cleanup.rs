@@ -66,5 +66,5 @@ fn report_cut_off(vm: &mut Vm) {
     }
     let name = report::task_label(vm, object);
     let all = if is_last { ", and so will those further out be that do not end at once" } else { "" };
-    vm.outside.complain(&format!("A cleanup of {name} takes too long and is left{all}.\n"));
+    vm.outside.complain(&format!("A cleanup of {name} takes too long and is cut off{all}.\n"));
 }

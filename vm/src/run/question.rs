@@ -50,7 +50,7 @@ fn all_are_to_end(vm: &Vm) -> bool {
 fn no_call(function: &FunctionRef) -> Answer {
     let (cause, message) = match function {
         FunctionRef::Kept(u64::MAX) => (":PROGRAM-ERROR", "The function belongs to another engine."),
-        _ => (":HEAP-EXHAUSTED", "There is no memory left for a task."),
+        _ => (":HEAP-EXHAUSTED", "Not enough memory for a task."),
     };
     Answer::Failed {
         cause: cause.into(),

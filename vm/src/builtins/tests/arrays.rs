@@ -95,7 +95,7 @@ fn fill_pointers_bound_sequences_but_not_aref() {
         ("(identity $0)", "#(1 2 A C D)"),
         ("(vector-pop $0)", "D"),
         ("(%set-fill-pointer $0 0)", "0"),
-        ("(vector-pop $0)", "error: there is nothing left to pop"),
+        ("(vector-pop $0)", "error: the vector is empty, so nothing can be popped"),
         ("(%set-fill-pointer $0 7)", "type-error 7 index below 7"),
         ("(array-has-fill-pointer-p $0)", "T"),
         ("(adjustable-array-p $0)", "NIL"),

@@ -78,7 +78,7 @@ fn files_are_read_and_written_whole() {
     let captured = host.captured();
     let mut vm = machine(host);
     assert_eq!(evaluate(&mut vm, "(%file-text \"in\")"), "\"äb\\n\"");
-    let missing = "file-error none: it cannot be read: there is no such file";
+    let missing = "file-error none: it cannot be read: the file does not exist";
     assert_eq!(evaluate(&mut vm, "(%file-text \"none\")"), missing);
     let exists = "file-error log: it cannot be written: the file exists already";
     assert_eq!(evaluate(&mut vm, "(%write-bytes \"log\" (%bytes-of-string \"x\") 2)"), exists);

@@ -83,7 +83,7 @@ fn packages() {
         ("(find-package \"CL\")", "<Some(Package)>"),
         ("(package-name $0)", "\"COMMON-LISP\""),
         ("(find-package \"NONE\")", "NIL"),
-        ("(package-name \"NONE\")", "package-error: there is no package NONE"),
+        ("(package-name \"NONE\")", "package-error: the package NONE does not exist"),
         ("(%make-package \"P\" '(\"PP\") '(\"CL\"))", "<Some(Package)>"),
         ("(package-nicknames 'p)", "(\"PP\")"),
         ("(package-use-list \"PP\")", "(<Some(Package)>)"),
@@ -139,9 +139,12 @@ fn structures() {
         ("(%class-slots 'point-3)", "(X Y Z)"),
         ("(%class-data 'point)", "DATA"),
         ("(%make-structure 'point 1 2 3)", "program-error: POINT has 2 slots, but 3 values were given"),
-        ("(%make-structure 'nowhere)", "program-error: there is no structure or condition type NOWHERE"),
+        (
+            "(%make-structure 'nowhere)",
+            "program-error: the structure or condition type NOWHERE does not exist",
+        ),
         ("(%find-class 'nowhere)", "NIL"),
         ("(%class-of 5)", "NIL"),
     ]);
-    check("(%make-class 'a '(b) nil nil)", "program-error: there is no structure or condition type B");
+    check("(%make-class 'a '(b) nil nil)", "program-error: the structure or condition type B does not exist");
 }
