@@ -10,7 +10,7 @@ use super::function::Body;
 use super::job::{Job, LetBindings, PARTS_AT_ONCE, To, UncheckedLet, VariableBinding};
 use super::origin::OriginId;
 use super::scope::{ScopeEntry, VariableMeaning};
-use super::variable::Deed;
+use super::variable::VariableChange;
 use crate::core::{BoundVariable, NodeKind};
 use crate::diagnostic::code;
 
@@ -102,7 +102,7 @@ fn binding(
         let help = bare_bindings(&form.args[0]);
         return Err(help.map_or(fault.clone(), |help| Box::new(fault.help(help))));
     }
-    let symbol = expander.variable_name(environment, datum, form, Deed::Bind)?;
+    let symbol = expander.variable_name(environment, datum, form, VariableChange::Bind)?;
     let value = value.unwrap_or_else(|| Datum::nil(form.at(datum.span())));
     Ok(VariableBinding { datum: datum.clone(), symbol, value })
 }
@@ -238,7 +238,7 @@ pub(super) fn multiple_value_bind(
     };
     let mut names = Vec::new();
     for item in items {
-        names.push((expander.variable_name(environment, item, &form, Deed::Bind)?, item.clone()));
+        names.push((expander.variable_name(environment, item, &form, VariableChange::Bind)?, item.clone()));
     }
     check_distinct(names.iter().map(|(symbol, datum)| (symbol, datum.span())), &form)?;
     if names.len() > MOST_VALUES {

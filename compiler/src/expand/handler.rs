@@ -8,7 +8,7 @@ use super::expander::Expander;
 use super::form::{Checked, Form, Make, fresh, quoted};
 use super::job::{Job, To};
 use super::scope::{ScopeEntry, VariableMeaning};
-use super::variable::Deed;
+use super::variable::VariableChange;
 use crate::core::{HandlerClause, NodeKind};
 use crate::diagnostic::code;
 
@@ -44,7 +44,7 @@ pub(super) fn handler_case(
         let forms: Vec<Datum> = body.iter().map(|&form| form.clone()).collect();
         let mut body = expander.take_body(&forms, false, &form, to.origin)?;
         let name: Symbol = match &bound {
-            Some(datum) => expander.variable_name(environment, datum, &form, Deed::Bind)?,
+            Some(datum) => expander.variable_name(environment, datum, &form, VariableChange::Bind)?,
             None => fresh(environment, "CONDITION"),
         };
         let inside = expander.child(to);

@@ -15,7 +15,7 @@ use super::job::{Job, To};
 use super::lambda_list::{LambdaList, LambdaListKind, OptionalSpec};
 use super::origin::OriginId;
 use super::scope::{FunctionMeaning, ScopeEntry, VariableMeaning, Visible};
-use super::variable::Deed;
+use super::variable::VariableChange;
 use crate::core::{
     BoundVariable, KeyParameter, Lambda, LambdaId, NodeId, NodeKind, OptionalParameter, Parameter,
 };
@@ -39,11 +39,11 @@ impl Expander {
         let list = LambdaList::parse(list, LambdaListKind::Ordinary, form.at(list.span()))?;
         let mut names = Vec::new();
         for datum in list.variables() {
-            names.push((self.variable_name(environment, datum, form, Deed::Bind)?, datum.span()));
+            names.push((self.variable_name(environment, datum, form, VariableChange::Bind)?, datum.span()));
         }
         check_distinct(names.iter().map(|(symbol, span)| (symbol, *span)), form)?;
         for (datum, _) in &list.aux {
-            self.variable_name(environment, datum, form, Deed::Bind)?;
+            self.variable_name(environment, datum, form, VariableChange::Bind)?;
         }
         let body = self.take_body(body, true, form, origin)?;
         let text = FunctionText { name, shown, list, body, block, form: form.datum.span() };

@@ -23,9 +23,9 @@ pub(super) enum Meaning {
     Constant(Datum),
 }
 
-/// Use of a variable by its name.
+/// A change of a variable by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Deed {
+pub(super) enum VariableChange {
     /// It is bound.
     Bind,
     /// It is set.
@@ -104,18 +104,18 @@ impl Expander {
         environment: &dyn Environment,
         symbol: &Symbol,
         span: Span,
-        deed: Deed,
+        change: VariableChange,
     ) -> Checked {
         let is_constant = symbol.is_keyword()
             || symbol.is_cl("T")
             || symbol.is_cl("NIL")
             || matches!(environment.global(symbol).variable, GlobalVariable::Constant(_));
         if is_constant {
-            let deed = match deed {
-                Deed::Bind => "bound",
-                Deed::Set => "set",
+            let change = match change {
+                VariableChange::Bind => "bound",
+                VariableChange::Set => "set",
             };
-            let message = format!("{} is a constant and cannot be {deed}", name(symbol));
+            let message = format!("{} is a constant and cannot be {change}", name(symbol));
             return Err(Box::new(code::ASSIGNMENT_TO_CONSTANT.at(span, message)));
         }
         Ok(())
@@ -127,7 +127,7 @@ impl Expander {
         environment: &dyn Environment,
         datum: &Datum,
         form: &Form,
-        deed: Deed,
+        change: VariableChange,
     ) -> Checked<Symbol> {
         let symbol = match datum.kind() {
             DatumKind::Symbol(symbol) => symbol.clone(),
@@ -135,8 +135,8 @@ impl Expander {
             _ => return Err(form.not_a_name(datum, "needs the name of a variable here")),
         };
         let is_local = matches!(self.scope.variable(&symbol, self.level()), Visible::Is(_));
-        if deed == Deed::Bind || !is_local {
-            self.check_not_constant(environment, &symbol, form.at(datum.span()), deed)?;
+        if change == VariableChange::Bind || !is_local {
+            self.check_not_constant(environment, &symbol, form.at(datum.span()), change)?;
         }
         Ok(symbol)
     }
@@ -215,7 +215,7 @@ pub(super) fn setq(
         expander.schedule(jobs);
         return Ok(());
     }
-    let symbol = expander.variable_name(environment, &form.args[0], &form, Deed::Set)?;
+    let symbol = expander.variable_name(environment, &form.args[0], &form, VariableChange::Set)?;
     let meaning = expander.meaning(environment, &symbol, to.span)?;
     if let Some(Meaning::Variable(VariableMeaning::SymbolMacro(_))) = meaning {
         let setf = Make(to.span).cl("SETF", form.args);
@@ -252,7 +252,7 @@ pub(super) fn psetq(
     let make = Make(to.span);
     let mut names = Vec::new();
     for pair in form.args.chunks(2) {
-        let symbol = expander.variable_name(environment, &pair[0], &form, Deed::Set)?;
+        let symbol = expander.variable_name(environment, &pair[0], &form, VariableChange::Set)?;
         if let Some(Meaning::Variable(VariableMeaning::SymbolMacro(_))) =
             expander.meaning(environment, &symbol, to.span)?
         {

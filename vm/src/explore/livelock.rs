@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 /// Rank that stands for time.
 pub(super) const TIME: u8 = 63;
 /// Rank that stands for no task.
-pub(super) const NOBODY: u8 = u8::MAX;
+pub(super) const NO_TASK: u8 = u8::MAX;
 
 /// The tasks in a state, as far as the search for livelocks needs them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub(super) struct StateTasks {
 /// The cause of a step from a state to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StepCause {
-    /// Rank of the task that went on, [`TIME`], or [`NOBODY`] if that is not known.
+    /// Rank of the task that went on, [`TIME`], or [`NO_TASK`] if that is not known.
     pub(super) ran: u8,
     /// The way that the program chose.
     pub(super) way: u16,

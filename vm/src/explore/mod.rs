@@ -8,7 +8,7 @@
 //! live          which registers of a frame belong to a state
 //! search        the tree of choices, and the states found
 //! trace         one run of the search, and taking in what it has come by
-//! crew          this thread, or several, among which the runs are divided
+//! worker        this thread, or several, among which the runs are divided
 //! keep          returning to places of that tree
 //! livelock      ways round that are fair to all
 //! ```
@@ -49,7 +49,6 @@
 //! 1988).
 
 mod content;
-mod crew;
 mod digest;
 mod fingerprint;
 mod keep;
@@ -62,6 +61,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod worker;
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{PoisonError, RwLock};
@@ -69,11 +69,11 @@ use std::sync::{PoisonError, RwLock};
 use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
-use crew::{Crew, LoneCrew, RunPlace, ThreadCrew};
 pub use point::FollowedRun;
 use search::Search;
 pub use step::{ScheduleEvent, ScheduleStep, StandingTask, Switch, TellStep};
 use trace::{MergePlace, Merged, Merging, TraceEnd};
+use worker::{RunPlace, SingleWorker, WorkerPool, Workers};
 
 /// When timers fire in an exploration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -284,7 +284,7 @@ pub fn explore_while<C, T: PartialEq + Clone, E>(
 ) -> Result<Exploration<T>, E> {
     let search = RwLock::new(Search::default());
     let subject = TwoFunctions { present: None, begin, judge };
-    let mut alone = LoneCrew::new(settings, &search, subject);
+    let mut alone = SingleWorker::new(settings, &search, subject);
     search_by(settings, &search, &mut alone, goes_on)
 }
 
@@ -308,12 +308,12 @@ pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
     }
     let (search, stop) = (RwLock::new(Search::default()), AtomicBool::new(false));
     let subject = || TwoFunctions { present: None, begin: &begin, judge: &judge };
-    let (crew, works) = ThreadCrew::new(jobs, settings, (&search, &stop), &subject);
-    let (mut crew, mut found) = (Some(crew), None);
+    let (pool, works) = WorkerPool::new(jobs, settings, (&search, &stop), &subject);
+    let (mut pool, mut found) = (Some(pool), None);
     side_by_side(works, &mut || {
-        // The threads end when the crew goes.
-        if let Some(mut crew) = crew.take() {
-            found = Some(search_by(settings, &search, &mut crew, &mut goes_on));
+        // The threads end when the pool is dropped.
+        if let Some(mut pool) = pool.take() {
+            found = Some(search_by(settings, &search, &mut pool, &mut goes_on));
         }
     });
     found.expect("the last function was called")
@@ -322,11 +322,11 @@ pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
 /// Runs of a batch: few enough that the shortest schedules come first, and enough for all threads.
 const BATCH: usize = 64;
 
-/// Searches with the help of a crew.
+/// Searches with the help of workers.
 fn search_by<T: PartialEq + Clone, E>(
     settings: &Settings,
     search: &RwLock<Search>,
-    crew: &mut dyn Crew<T, E>,
+    workers: &mut dyn Workers<T, E>,
     mut goes_on: impl FnMut(&SearchProgress) -> bool,
 ) -> Result<Exploration<T>, E> {
     let write = || search.write().unwrap_or_else(PoisonError::into_inner);
@@ -342,7 +342,7 @@ fn search_by<T: PartialEq + Clone, E>(
         }
         let places: Vec<RunPlace> =
             batch.into_iter().zip(runs as u64..).map(|(node, serial)| RunPlace { node, serial }).collect();
-        let mut traces = crew.run(places.clone(), &mut |more| {
+        let mut traces = workers.run(places.clone(), &mut |more| {
             goes_on(&SearchProgress { states: progress.states + more, ..progress })
         })?;
         let search = &mut *write();

@@ -3,12 +3,12 @@
 use smallvec::SmallVec;
 
 use super::Subject;
-use super::crew::{ClaimedStep, Claims, RunPlace};
 use super::keep::Keeper;
-use super::livelock::{NOBODY, StateStep, StateTasks, StepCause, TIME};
+use super::livelock::{NO_TASK, StateStep, StateTasks, StepCause, TIME};
 use super::point::{PointRun, living_tasks};
 use super::search::{ROOT, Search};
 use super::step::Runnable;
+use super::worker::{ClaimedStep, Claims, RunPlace};
 use super::{SearchLimit, Settings};
 use crate::task::TaskNumber;
 use crate::vm::Vm;
@@ -75,7 +75,7 @@ impl TasksAtPoint {
 /// Returns the rank of a task among others.
 fn rank(numbers: &[TaskNumber], task: TaskNumber) -> u8 {
     let rank = numbers.binary_search(&task).ok().and_then(|rank| u8::try_from(rank).ok());
-    rank.filter(|&rank| rank < TIME).unwrap_or(NOBODY)
+    rank.filter(|&rank| rank < TIME).unwrap_or(NO_TASK)
 }
 
 /// How a run of the search has ended.
@@ -163,7 +163,7 @@ impl<'a, S: Subject> Tracer<'a, S> {
             let state = keeper.fingerprints.of(vm);
             let (count, has_last) = (runnable.count(), runnable.has_last);
             let (here, tasks) = TasksAtPoint::of(vm, run, runnable);
-            let unknown = StepCause { ran: NOBODY, way: 0, keeps_tasks: false };
+            let unknown = StepCause { ran: NO_TASK, way: 0, keeps_tasks: false };
             let cause = before.as_ref().map_or(unknown, |before| before.cause(&here.numbers, run.last()));
             before = Some(here);
             steps.push(TraceStep { state, count, has_last, has_ways: runnable.ways.is_some(), tasks, cause });

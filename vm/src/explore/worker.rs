@@ -49,7 +49,7 @@ impl Claims {
 }
 
 /// The workers of a search.
-pub(super) trait Crew<T, E> {
+pub(super) trait Workers<T, E> {
     /// Runs on from each of these places, and returns what the runs have come by, in the same order. Where
     /// one comes to what another one has claimed, it ends. Stops all when `goes_on` is false, which is told
     /// the number of new states that the batch has come to so far.
@@ -69,18 +69,18 @@ fn read(search: &RwLock<Search>) -> RwLockReadGuard<'_, Search> {
 }
 
 /// This thread alone.
-pub(super) struct LoneCrew<'a, S: Subject> {
+pub(super) struct SingleWorker<'a, S: Subject> {
     search: &'a RwLock<Search>,
     tracer: Tracer<'a, S>,
 }
 
-impl<'a, S: Subject> LoneCrew<'a, S> {
-    pub(super) fn new(settings: &'a Settings, search: &'a RwLock<Search>, subject: S) -> LoneCrew<'a, S> {
-        LoneCrew { search, tracer: Tracer::new(settings, settings.memory, subject) }
+impl<'a, S: Subject> SingleWorker<'a, S> {
+    pub(super) fn new(settings: &'a Settings, search: &'a RwLock<Search>, subject: S) -> SingleWorker<'a, S> {
+        SingleWorker { search, tracer: Tracer::new(settings, settings.memory, subject) }
     }
 }
 
-impl<S: Subject> Crew<S::Ending, S::Error> for LoneCrew<'_, S> {
+impl<S: Subject> Workers<S::Ending, S::Error> for SingleWorker<'_, S> {
     fn run(
         &mut self,
         batch: Vec<RunPlace>,
@@ -150,28 +150,27 @@ impl<T, E> Drop for TellsAtEnd<'_, T, E> {
     }
 }
 
-/// Several threads.
-pub(super) struct ThreadCrew<'a, T, E> {
-    members: Vec<Sender<Arc<SharedBatch>>>,
+/// A pool of worker threads.
+pub(super) struct WorkerPool<'a, T, E> {
+    workers: Vec<Sender<Arc<SharedBatch>>>,
     told: Receiver<BatchPart<T, E>>,
     /// Whether all are to stop.
     stop: &'a AtomicBool,
 }
 
-/// The work of one thread.
-pub(super) type Member<'a> = Box<dyn FnOnce() + Send + 'a>;
+/// The work of one thread of a pool.
+pub(super) type PoolWorker<'a> = Box<dyn FnOnce() + Send + 'a>;
 
-impl<'a, T: Send + 'a, E: Send + 'a> ThreadCrew<'a, T, E> {
-    /// Creates a crew of so many members, whom the caller lets work in threads. Each makes a subject of its
-    /// own.
+impl<'a, T: Send + 'a, E: Send + 'a> WorkerPool<'a, T, E> {
+    /// Creates a pool of so many workers, which the caller runs in threads. Each makes a subject of its own.
     pub(super) fn new<S: Subject<Ending = T, Error = E>>(
         jobs: usize,
         settings: &'a Settings,
         (search, stop): (&'a RwLock<Search>, &'a AtomicBool),
         subject: &'a (impl Fn() -> S + Sync),
-    ) -> (ThreadCrew<'a, T, E>, Vec<Member<'a>>) {
+    ) -> (WorkerPool<'a, T, E>, Vec<PoolWorker<'a>>) {
         let (tell, told) = channel();
-        let (mut members, mut works) = (Vec::new(), Vec::<Member<'a>>::new());
+        let (mut workers, mut works) = (Vec::new(), Vec::<PoolWorker<'a>>::new());
         for _ in 0..jobs {
             let (order, orders) = channel::<Arc<SharedBatch>>();
             let tell = tell.clone();
@@ -183,9 +182,9 @@ impl<'a, T: Send + 'a, E: Send + 'a> ThreadCrew<'a, T, E> {
                     work(&mut tracer, &read(search), &batch, stop, &mut told.part);
                 }
             }));
-            members.push(order);
+            workers.push(order);
         }
-        (ThreadCrew { members, told, stop }, works)
+        (WorkerPool { workers, told, stop }, works)
     }
 }
 
@@ -218,7 +217,7 @@ fn work<S: Subject>(
     }
 }
 
-impl<T: Send, E: Send> Crew<T, E> for ThreadCrew<'_, T, E> {
+impl<T: Send, E: Send> Workers<T, E> for WorkerPool<'_, T, E> {
     fn run(
         &mut self,
         batch: Vec<RunPlace>,
@@ -233,8 +232,8 @@ impl<T: Send, E: Send> Crew<T, E> for ThreadCrew<'_, T, E> {
             states: AtomicUsize::new(0),
         });
         let mut working = 0;
-        for member in &self.members {
-            working += usize::from(member.send(batch.clone()).is_ok());
+        for worker in &self.workers {
+            working += usize::from(worker.send(batch.clone()).is_ok());
         }
         let mut traces: Vec<Option<RunTrace<T>>> = (0..count).map(|_| None).collect();
         let mut failed = None;
