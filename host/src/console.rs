@@ -4,10 +4,10 @@
 //! input, and at its end. Standard error is written at once, after the contents of standard output's buffer,
 //! so that both appear in the order of the program. Input is decoded as UTF-8; invalid bytes become U+FFFD.
 //!
-//! What a program prints is written as far as there is room. The rest stays in the buffer, and tasks that
-//! print more wait meanwhile; only the end of a run, and its reports, wait for the reader.
+//! Output of a program is written as far as there is room. The rest stays in the buffer, and tasks that print
+//! more wait meanwhile; only the end of a run, and its reports, wait for the reader.
 //!
-//! Guarantees: once nobody reads standard output any more, everything written to it is dropped, and
+//! Guarantees: once the reader of standard output has closed it, everything written to it is dropped, and
 //! [`Console::is_broken`] holds: the run ends quietly.
 
 use esl_heap::list_state;
@@ -23,8 +23,8 @@ const BLOCK: usize = 1 << 14;
 #[derive(Clone, Default)]
 pub struct Console {
     output: Vec<u8>,
-    /// What there was no room for on standard error. While there is anything, no more is written to standard
-    /// output, whose buffer was empty then.
+    /// Text for which standard error had no room. While there is any, nothing is written to standard output,
+    /// whose buffer was empty then.
     errors: Vec<u8>,
     /// Characters since the last line end, by stream.
     columns: [usize; 2],
@@ -172,7 +172,7 @@ impl Console {
         self.columns[output as usize]
     }
 
-    /// Returns whether nobody reads standard output any more.
+    /// Returns whether the reader of standard output has closed it.
     #[inline]
     pub fn is_broken(&self) -> bool {
         self.broken

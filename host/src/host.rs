@@ -61,7 +61,7 @@ pub enum FileRequest<'a> {
     TrueName(&'a str),
 }
 
-/// What comes of a [`FileRequest`].
+/// The answer to a [`FileRequest`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileAnswer {
     /// Names, in order.
@@ -117,7 +117,7 @@ impl From<&std::io::Error> for HostError {
     }
 }
 
-/// What a host waits for beside a time.
+/// The events that a host waits for beside a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Awaited {
     /// Whether tasks wait for standard input.
@@ -136,9 +136,9 @@ pub enum Wake {
     Time,
     /// Something has come into the inbox, or standard input has data.
     Arrival,
-    /// Somebody wants to look at the run, and nothing else has come: the machine answers, and waits on.
+    /// A survey is requested, and nothing else has arrived: the machine answers, and waits on.
     Look,
-    /// Nothing can ever arrive: there is no deadline, no input, and nobody from whom to expect anything.
+    /// Nothing can ever arrive: there is no deadline, no input, and no sender.
     Never,
 }
 
@@ -197,7 +197,7 @@ pub trait Host {
         0
     }
 
-    /// Returns whether time passes only when somebody waits, so that a long computation has to let some pass
+    /// Returns whether time passes only during waits, so that a long computation has to let some pass
     /// explicitly.
     fn is_virtual(&self) -> bool {
         false
@@ -217,7 +217,8 @@ pub trait Host {
     /// Writes all of the bytes to a standard stream.
     ///
     /// # Errors
-    /// [`HostError::BrokenPipe`] if nobody reads them, another error if they could not be written.
+    /// [`HostError::BrokenPipe`] if the reader has closed the stream, another error if they could not be
+    /// written.
     fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError>;
 
     /// Writes as many of the bytes to a standard stream as there is room for, without waiting, and returns
@@ -298,7 +299,7 @@ pub trait Host {
         self.inbox().take()
     }
 
-    /// Returns the exit status of a program whose standard output nobody reads any more: that of a program
+    /// Returns the exit status of a program whose standard output was closed by its reader: that of a program
     /// that SIGPIPE has ended.
     fn broken_output_status(&self) -> u8 {
         128 + 13

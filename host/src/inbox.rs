@@ -35,7 +35,7 @@ pub enum Incoming {
     Operation {
         /// Number of the operation.
         number: u64,
-        /// What is heard of it.
+        /// The news of it.
         news: News,
     },
     /// A signal of an input of the program.
@@ -45,11 +45,11 @@ pub enum Incoming {
         /// Arguments of the signal.
         arguments: Vec<Datum>,
     },
-    /// A question, whose answer is for whoever waits for its number.
+    /// A question, whose answer goes to the caller that waits for its number.
     Question {
         /// Number of the question.
         number: u64,
-        /// What is asked.
+        /// The question.
         question: Question,
     },
     /// The task with this number is to end.
@@ -60,13 +60,13 @@ pub enum Incoming {
     Pause(bool),
     /// The outside has let go of the value that is kept for it under this number.
     Release(u64),
-    /// Observers have come, who are to watch the run.
+    /// Observers have arrived, which are to be registered.
     Watch,
-    /// There is one more who may send messages.
+    /// One more sender exists.
     SenderCame,
-    /// One of those has gone.
+    /// A sender is gone.
     SenderLeft,
-    /// Operators may come at any time, who send messages.
+    /// Operators that send messages may attach at any time.
     Attended,
 }
 
@@ -75,10 +75,11 @@ struct InboxState {
     /// Whether something was put in, or the bell rung, since the contents were taken last.
     is_rung: AtomicBool,
     contents: Mutex<Vec<Incoming>>,
-    /// Notified, under the lock of `contents`, when `is_rung` is set and somebody waits.
+    /// Notified, under the lock of `contents`, when `is_rung` is set and a thread waits.
     bell: Condvar,
-    /// How many wait for the bell; read and written under the lock of `contents`. To notify nobody takes a
-    /// call of the system too, and most messages come while the machine runs.
+    /// Number of threads that wait for the bell; read and written under the lock of `contents`. A
+    /// notification without waiters takes a call of the system too, and most messages come while the machine
+    /// runs.
     waiting: AtomicU32,
     /// Looks, which come beside the contents.
     looks: Mutex<Looks>,
@@ -90,7 +91,7 @@ struct InboxState {
     waker: Mutex<Option<Waker>>,
 }
 
-/// The inbox of one machine, shared by those who put things in and the host that takes them out.
+/// The inbox of one machine, shared by its senders and the host that takes the contents out.
 #[derive(Clone, Default)]
 pub struct Inbox(Arc<InboxState>);
 
@@ -133,7 +134,7 @@ impl Inbox {
     /// As [`Inbox::ring`], under the lock of the contents.
     fn ring_under(&self, _contents: &MutexGuard<'_, Vec<Incoming>>) {
         if self.0.is_rung.swap(true, Ordering::Relaxed) {
-            // Whoever waits has been told, and who is to be woken is when they say so.
+            // Waiting threads have been notified, and a waker that is set later is woken when it is set.
             return;
         }
         if self.0.waiting.load(Ordering::Relaxed) > 0 {

@@ -68,7 +68,7 @@ pub use rights::{Permit, Right, Rights};
 pub use signal::ProcessSignal;
 pub use virtual_host::{Captured, VirtualHost};
 
-/// The names that a machine needs, and nobody else.
+/// The names that only a machine needs.
 pub mod machine {
     pub use crate::asked::Asked;
     pub use crate::canary::Canary;

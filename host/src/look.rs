@@ -1,4 +1,4 @@
-//! Looks: what those outside want to see of a run who take no part in it.
+//! Looks: requests from outside to inspect a run, without side effects.
 //!
 //! A look comes to the machine beside the contents of the inbox, and is answered between two turns, also
 //! while the machine sleeps in its host. It belongs to no round, is in no recording and wakes no task, so a
@@ -10,7 +10,7 @@ use esl_bytecode::compile::SourcePlace;
 
 use super::Inbox;
 
-/// What is to be seen of a run.
+/// A request for a survey of a run.
 #[derive(Clone, Debug, Default)]
 pub struct SurveyRequest {
     /// Most tasks that are told of, in the order of their numbers, beside those that are named.
@@ -30,7 +30,7 @@ pub struct SurveyRequest {
     pub failures_after: Option<u64>,
 }
 
-/// What a task does.
+/// The activity of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TaskStanding {
     /// It can run.
@@ -66,11 +66,11 @@ pub struct SurveyedTask {
     pub number: u64,
     /// Number of its maker; 0 if the embedder has made it.
     pub maker: u64,
-    /// What reports call it.
+    /// Its name in reports.
     pub name: String,
-    /// What it does.
+    /// Its activity.
     pub standing: TaskStanding,
-    /// What it waits for, as reports say it.
+    /// The object of its wait, as in reports.
     pub waits_for: Option<String>,
     /// Numbers of the tasks on which that depends: those whose end it waits for, or that hold what it wants.
     pub held_by: Vec<u64>,
@@ -143,7 +143,7 @@ pub struct LockRow {
 pub struct InputRow {
     /// Name, in upper case.
     pub name: String,
-    /// Signals that nobody has taken yet.
+    /// Signals that are not taken yet.
     pub kept: usize,
     /// Signals for which there is room.
     pub capacity: usize,
@@ -156,7 +156,7 @@ pub struct InputRow {
 /// A call that a failure has left unfinished.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FailureFrame {
-    /// What reports call the task in which it was.
+    /// Name of its task in reports.
     pub task: String,
     /// Name of its function, as the program prints it.
     pub function: String,
@@ -175,7 +175,7 @@ pub struct FailureRow {
     pub time: u64,
     /// Number of the task.
     pub task: u64,
-    /// What reports call the task.
+    /// Name of the task in reports.
     pub name: String,
     /// Its cause.
     pub cause: String,
@@ -251,7 +251,7 @@ pub struct RunFigures {
     pub lateness: Lateness,
 }
 
-/// What is seen of a run between two turns.
+/// The state of a run between two turns, as data.
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
     /// Figures.
@@ -274,11 +274,11 @@ pub struct Survey {
     pub failures: Vec<FailureRow>,
 }
 
-/// Something that is to be looked at, or somebody who is to look on.
+/// A survey to be made, or observers to be registered.
 pub enum Look {
-    /// A survey, and who is told of it. It is dropped if the machine is gone.
+    /// A survey, and the callback that receives it. It is dropped if the machine is gone.
     Survey(SurveyRequest, Box<dyn FnOnce(Survey) + Send>),
-    /// Observers have come, who are to watch the run.
+    /// Observers have arrived, which are to be registered.
     Watch,
 }
 

@@ -20,7 +20,7 @@ pub struct HostFailure {
     pub arguments: Vec<Datum>,
 }
 
-/// What is heard of an operation.
+/// News of an operation.
 #[derive(Clone, Debug)]
 pub enum News {
     /// It goes on, and this is how far it is.
@@ -31,10 +31,10 @@ pub enum News {
     Failed(HostFailure),
 }
 
-/// What happens when the program cancels an operation.
+/// The reaction to the program's cancelling an operation.
 #[derive(Default)]
 enum OnCancel {
-    /// Nobody has said it yet.
+    /// Not set yet.
     #[default]
     Unknown,
     /// This function is called.
@@ -43,7 +43,7 @@ enum OnCancel {
     Done,
 }
 
-/// What the outside is told of suspensions of the task that has begun an operation.
+/// Suspension of the task that has begun an operation, as the outside sees it.
 #[derive(Default)]
 struct Suspension {
     /// Whether the task stands still.
@@ -52,7 +52,7 @@ struct Suspension {
     on_change: Option<Box<dyn FnMut(bool) + Send>>,
 }
 
-/// What the two parts of an operation share.
+/// The state shared by the two parts of an operation.
 #[derive(Default)]
 struct Shared {
     on_cancel: Mutex<OnCancel>,
@@ -249,7 +249,7 @@ mod tests {
             canceller.suspend(is_suspended);
         }
         assert_eq!(*told.lock().expect("nobody panics"), [true, false, true]);
-        // One who comes later learns of it at once.
+        // A listener that registers later learns of it at once.
         let later = Arc::new(Mutex::new(Vec::new()));
         operation.on_suspension(listen(&later));
         canceller.suspend(false);

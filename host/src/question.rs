@@ -1,8 +1,8 @@
 //! Questions from outside to a run, and the answers.
 //!
-//! A question comes into the inbox as plain data with a number. Where the answer goes, the machine does not
-//! know: it is handed to whoever waits for that number, if anybody does. So a replay, in which nobody does,
-//! is the same run.
+//! A question comes into the inbox as plain data with a number. The machine does not know the destination of
+//! the answer: it goes to the caller that waits for that number, if there is one. So a replay, which has no
+//! such callers, is the same run.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -59,10 +59,10 @@ impl Kept {
     }
 }
 
-/// What is asked of a run.
+/// A question to a run.
 #[derive(Clone, Debug)]
 pub enum Question {
-    /// What a function returns, which is called in a task of its own.
+    /// A call of a function in a task of its own.
     Call {
         /// The function.
         function: FunctionRef,
@@ -83,15 +83,15 @@ pub struct TaskInfo {
     pub number: u64,
     /// Number of the task that has made it; 0 if the embedder has.
     pub maker: u64,
-    /// What reports call it.
+    /// Its name in reports.
     pub name: String,
-    /// What it waits for, as reports say it; `None` if it can run.
+    /// The object of its wait, as in reports; `None` if it can run.
     pub waits_for: Option<String>,
     /// Ticks that it has used.
     pub ticks: u64,
 }
 
-/// What is answered.
+/// An answer of a run.
 #[derive(Clone, Debug)]
 pub enum Answer {
     /// The values of the call.
@@ -106,7 +106,7 @@ pub enum Answer {
         cause: String,
         /// Text of the condition.
         message: String,
-        /// What has happened where.
+        /// Report of the failure, with its places.
         report: String,
         /// Arguments of the failure, if its cause is one of the program's.
         arguments: Vec<Datum>,
@@ -147,7 +147,7 @@ impl Slot {
     }
 }
 
-/// Those who wait for answers, by the numbers of their questions.
+/// The callers that wait for answers, by the numbers of their questions.
 #[derive(Default)]
 pub(super) struct Asking(Mutex<OpenQuestions>);
 
@@ -166,7 +166,7 @@ impl Asking {
 }
 
 impl Inbox {
-    /// Hands the answer to the question with this number to whoever waits for it.
+    /// Hands the answer to the question with this number to the caller that waits for it.
     #[doc(hidden)]
     pub fn answer(&self, number: u64, answer: Answer) {
         let slot = self.asking().waiting().slots.remove(&number);

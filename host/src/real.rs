@@ -44,7 +44,7 @@ pub struct RealHost {
     /// Requests a chunk from the reading thread, which is started at the first request.
     reader: Option<Sender<()>>,
     is_reading: bool,
-    /// What is known of standard output and standard error.
+    /// The states of standard output and standard error.
     #[cfg(unix)]
     outputs: [OutputState; 2],
     /// Destination of both output streams, in place of the process's own.
@@ -296,7 +296,7 @@ impl Host for RealHost {
                 Err(rustix::io::Errno::AGAIN) => {
                     return self.write(output, &bytes[done..]).map(|()| bytes.len());
                 }
-                // As the standard library has it: nobody has the stream, and nobody misses what is written.
+                // As in the standard library: the stream is closed, and output to it is dropped.
                 Err(rustix::io::Errno::BADF) => return Ok(bytes.len()),
                 Err(error) => return Err(error_of(&error.into())),
             }

@@ -10,7 +10,7 @@ use super::{Inbox, Incoming, Output};
 /// Bytes that a pipe has room for when it has any.
 pub(super) const PIECE: usize = 4096;
 
-/// What is known of an output stream.
+/// The state of an output stream.
 #[derive(Default)]
 pub(super) struct OutputState {
     /// Whether a reader can delay it; unknown before the first write.
@@ -59,7 +59,7 @@ impl OutputState {
         })
     }
 
-    /// Has `inbox` told when the stream has room. Returns false if nobody can do that.
+    /// Notifies `inbox` when the stream has room. Returns false if that is impossible.
     pub(super) fn watch(&mut self, output: Output, inbox: &Inbox) -> bool {
         if self.is_watched.swap(true, Ordering::Relaxed) {
             return true;

@@ -64,7 +64,7 @@ impl Right {
     }
 }
 
-/// What a program may reach; by default nothing.
+/// The rights of a program; by default none.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Rights {
     /// Rights to everything of a kind.

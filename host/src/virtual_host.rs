@@ -101,7 +101,7 @@ pub struct VirtualHost {
     arguments: Vec<String>,
     input: VecDeque<Vec<u8>>,
     inbox: Inbox,
-    /// What is to come into the inbox, by the times of arrival, the earliest first.
+    /// Future contents of the inbox, by the times of arrival, the earliest first.
     arrivals: VecDeque<(u64, Incoming)>,
     captured: Captured,
     /// Number of bytes that may still be written to standard output before it breaks.

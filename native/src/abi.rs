@@ -1,4 +1,4 @@
-//! What machine code is given, and how it is left.
+//! The interface of machine code: its arguments, and its exits.
 
 use std::ffi::c_void;
 use std::mem::MaybeUninit;
@@ -23,26 +23,26 @@ pub const GUESSED_WRONG: u64 = 5;
 /// As [`AGAIN`], at a call of a function that was inlined, and is no longer the one that is called.
 pub const REDEFINED: u64 = 6;
 
-/// What a helper says of an instruction: go on with the next one.
+/// Reply of a helper for an instruction: go on with the next one.
 pub const STEP_NEXT: u64 = 0;
-/// What a helper says of an instruction: it jumps.
+/// Reply of a helper for an instruction: it jumps.
 pub const STEP_JUMP: u64 = 1;
-/// What a helper says of an instruction: the machine code is to be left with [`SIGNAL`].
+/// Reply of a helper for an instruction: leave the machine code with [`SIGNAL`].
 pub const STEP_SIGNAL: u64 = 2;
-/// What a helper says of a builtin called in place of the function: its values are in the value list.
+/// Reply of a helper for a builtin called in place of the function: its values are in the value list.
 pub const STEP_VALUES: u64 = 3;
 
-/// What a helper says of a call: it is given up, without effect.
+/// Reply of a helper for a call: it is given up, without effect.
 pub const CALL_AGAIN: u64 = 0;
-/// What a helper says of a call: a builtin was called, and its values are where the call wants them.
+/// Reply of a helper for a call: a builtin was called, and its values are where the call wants them.
 pub const CALL_DONE: u64 = 1;
-/// What a helper says of a tail call: a builtin was called, and its values are in the value list.
+/// Reply of a helper for a tail call: a builtin was called, and its values are in the value list.
 pub const CALL_VALUES: u64 = 2;
-/// What a helper says of a call: the machine code is to be left with [`SIGNAL`]. Above it are addresses.
+/// Reply of a helper for a call: leave the machine code with [`SIGNAL`]. Greater replies are addresses.
 pub const CALL_SIGNAL: u64 = 3;
 
-/// What is put aside of a register whose place is as it should be: no result of an operation, and no double
-/// that a program has.
+/// The spilled word of a register whose place is up to date: no operation has this result, and no program
+/// this double.
 pub const IN_PLACE: u64 = 0x7FF8_1E57_1E57_1E57;
 
 /// Function of the machine that does the instruction at `pc` in the frame `base`.
@@ -71,7 +71,7 @@ pub type NativeLookup = unsafe extern "C" fn(*mut NativeContext, u64, u64, u64, 
 /// numbers from 1 on for loop instructions.
 pub type NativeEntry = unsafe extern "C" fn(*mut NativeContext, *mut u64, u64) -> NativeReply;
 
-/// What machine code shares with the interpreter.
+/// The state that machine code shares with the interpreter.
 #[repr(C)]
 #[derive(Debug)]
 pub struct NativeContext {
@@ -129,7 +129,7 @@ pub struct NativeContext {
     pub last_lookup: *mut LastLookup,
     /// Whether the collector wants the next tick to be a safepoint.
     pub gc_due: *const bool,
-    /// What has been charged beside ticks: not zero if the next builtin is to see to it.
+    /// Charges beside ticks: not zero if the next builtin is to settle them.
     pub charges: *const u64,
     /// Finds the value of a key: with what it is if the table has none.
     pub value_of_key: NativeLookup,

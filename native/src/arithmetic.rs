@@ -65,7 +65,7 @@ impl Translator<'_, '_> {
             return self.on_doubles_later(operation, p, q, dst);
         }
         if operation != Arithmetic::Divide && x.1 == Known::Fixnum && y.1 == Known::Fixnum {
-            // What overflows leaves the machine code, so the result is known.
+            // An overflow leaves the machine code, so the result is a fixnum.
             let exit = self.exit();
             let result = self.on_fixnums(operation, x.0, y.0, exit);
             return self.set(dst, result, Known::Fixnum);

@@ -19,7 +19,7 @@ use crate::translate::Translator;
 /// Where the link of a frame has its function, from the frame's base on.
 const FUNCTION: i32 = -2 * WORD;
 
-/// What a call in place of the running function has come to.
+/// The outcome of a call in place of the running function.
 pub(crate) struct Replaced {
     /// Address of the machine code whose frame it is now.
     pub(crate) address: Ssa,

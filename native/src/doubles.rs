@@ -31,7 +31,7 @@ pub(crate) struct DoubleBatch {
     at: usize,
     /// RegisterBits that were kept back there.
     kept_back: RegisterBits,
-    /// What has been overwritten since of those.
+    /// Those that have been overwritten since.
     saved: Vec<(usize, Ssa)>,
     /// The results, and whether they may be zeros.
     results: Vec<(Ssa, bool)>,
@@ -43,12 +43,12 @@ pub(crate) struct DoubleBatch {
     ways_out: Vec<(u64, Block)>,
 }
 
-/// What has to be done where control goes to another instruction.
+/// Work to be done where control goes to another instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum EdgeWork {
     /// The register is not kept back: it gets the mark.
     Mark(usize),
-    /// What is kept back goes to its place, and is a word from there on.
+    /// The register is spilled to its place, and is a word from there on.
     PutBack(usize),
     /// The word is taken from its place.
     Take(usize),
@@ -274,7 +274,7 @@ impl Translator<'_, '_> {
         self.b.ins().select(is_negative, negative, positive)
     }
 
-    /// Returns the word of a double in a register. Where nobody uses it nothing is made of it.
+    /// Returns the word of a double in a register. Cranelift drops it where it is not used.
     pub(crate) fn word_of_double(&mut self, register: usize) -> Ssa {
         if let Some(word) = self.words[register] {
             return word;
@@ -340,7 +340,7 @@ impl Translator<'_, '_> {
         self.b.ins().bitcast(types::F64, MemFlagsData::new(), bits)
     }
 
-    // What is kept back.
+    // Registers that are not spilled yet.
 
     /// Returns the registers that are kept back here: doubles, and such as may be.
     pub(crate) fn kept_back(&self) -> (RegisterBits, RegisterBits) {
@@ -425,8 +425,8 @@ impl Translator<'_, '_> {
         self.kept_back = kept_back.without(self.kept_back);
     }
 
-    /// Writes words that hold no address where doubles are kept back that nobody will read, in some of the
-    /// registers.
+    /// Writes words that hold no address to the places of unspilled doubles that will not be read, for some
+    /// of the registers.
     pub(crate) fn clear_places(&mut self, registers: RegisterBits) {
         let (doubles, spent) = self.kept_back();
         let (zero, base) = (self.constant_value(Value::small(0)), self.base);

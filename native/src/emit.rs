@@ -337,7 +337,7 @@ impl Translator<'_, '_> {
 
     /// Has a function of the machine do the instruction, and returns what it says.
     ///
-    /// What is kept back is put aside first, on this way only.
+    /// Unspilled registers are saved first, on this path only.
     pub(crate) fn call_helper(&mut self, helper: usize) -> Ssa {
         debug_assert!(self.batch.is_none(), "{}", self.at);
         self.put_all_aside(self.kept_back);

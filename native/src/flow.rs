@@ -133,7 +133,7 @@ impl FlowStep {
 /// The instructions of the function itself, or those of one call of an inlined one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FlowFrame<'a> {
-    /// What is translated.
+    /// The translated function.
     pub(crate) source: &'a FunctionSource,
     /// The word that its first one is.
     pub(crate) first: usize,
@@ -156,7 +156,7 @@ impl FlowFrame<'_> {
     }
 }
 
-/// What is inlined at a call.
+/// The function inlined at a call.
 struct InlinedCall<'a> {
     source: &'a FunctionSource,
     guard: Option<Value>,

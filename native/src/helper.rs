@@ -1,7 +1,7 @@
 //! A thread that makes machine code, so that nothing waits for it.
 //!
 //! It is given copies of what is translated, and knows nothing of the machine. It ends when its owner is
-//! dropped; what it has made and nobody has taken is given back.
+//! dropped; machine code that was not taken is released.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
@@ -12,7 +12,7 @@ use crate::maker::{MachineCode, MachineCodeMaker, NativeSource, NotMade};
 /// Bytes of the thread's stack.
 const STACK: usize = 4 << 20;
 
-/// What has become of an order.
+/// The outcome of an order.
 #[derive(Debug)]
 pub struct MadeCode {
     /// Number of the order.

@@ -10,7 +10,7 @@
 //! double when the machine code was asked for, the guess is that it will again; the instruction tests it.
 //!
 //! A computed double stays in a register of the processor, and its place in the stack is not written: it is
-//! *kept back* until somebody may look there (N3). Where paths meet, all registers that can be are kept back.
+//! spilled only where the slot may be read (N3). Where paths meet, all registers that can stay unspilled do.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::{Instr, RegisterAccess};
@@ -21,7 +21,7 @@ use crate::flow::{FlowStep, FrameChange, NativeFlow};
 use crate::maker::NativeSource;
 use crate::places::RegisterBits;
 
-/// What is known of the content of a register.
+/// The known kind of the contents of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Known {
     /// Nothing.
@@ -30,8 +30,8 @@ pub enum Known {
     Fixnum,
     /// It is a finite double without a box.
     Double,
-    /// Nobody reads it from there on, and on some way there it is a double that is kept back. Where it is
-    /// not, the register of the processor has a mark.
+    /// It is not read from there on, and on some path there it is an unspilled double. On the others, the
+    /// register of the processor has a mark.
     Spent,
 }
 
@@ -46,7 +46,7 @@ impl Known {
     }
 }
 
-/// What is known before each word of a function at which an instruction begins.
+/// The known kinds before each word of a function at which an instruction begins.
 #[derive(Debug)]
 pub(crate) struct NativeKinds {
     before: Vec<Option<Box<[Known]>>>,
@@ -54,7 +54,7 @@ pub(crate) struct NativeKinds {
     live: Vec<RegisterBits>,
     /// RegisterBits that may be kept back there.
     kept_back: Vec<RegisterBits>,
-    /// What registers are guessed to hold.
+    /// The guessed kinds of registers.
     guesses: Vec<Known>,
     /// Whether doubles are told from other values at all.
     tells_doubles: bool,
@@ -170,7 +170,7 @@ impl NativeKinds {
     }
 
     fn follow(&mut self, flow: &NativeFlow<'_>) {
-        // What is read before it is written is a parameter.
+        // A register that is read before it is written is a parameter.
         let entry = (0..flow.registers)
             .map(|register| if self.is_live(0, register) { self.guesses[register] } else { Known::Nothing });
         let entry: Box<[Known]> = entry.collect();
@@ -451,7 +451,7 @@ fn apply(instr: &Instr, kinds: &mut [Known], of_constant: impl Fn(usize) -> Know
             let are_fixnums = (of(left.0), of(right.0)) == (Fixnum, Fixnum);
             Some((dst.0, if are_fixnums { Fixnum } else { Nothing }))
         }
-        // What is no fixnum leads out of the machine code.
+        // A value that is not a fixnum leaves the machine code.
         Instr::LoopCount { counter, .. } if of(counter.0) == Fixnum => Some((counter.0, Fixnum)),
         _ => None,
     };

@@ -36,7 +36,7 @@
 //!   are there.
 //!
 //! The code is in memory that is either writable or executable, never both. It is given back when the
-//! [`MachineCode`] is dropped: whoever keeps it must not drop it while it runs.
+//! [`MachineCode`] is dropped: its owner must not drop it while it runs.
 
 #![allow(unsafe_code)]
 

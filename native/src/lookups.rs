@@ -22,7 +22,7 @@ use crate::emit::{ELEMENTS, WORD, in_object, memory};
 use crate::kinds::Known;
 use crate::translate::Translator;
 
-/// What a builtin does with the entry of a key.
+/// The operation of a builtin on the entry of a key.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TableOperation {
     /// Returns the value; a default if there is none.

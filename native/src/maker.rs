@@ -53,15 +53,15 @@ pub struct InlinedSource {
     pub function: FunctionSource,
 }
 
-/// What is translated.
+/// The input of a translation.
 #[derive(Clone, Debug)]
 pub struct NativeSource {
     /// The function.
     pub function: FunctionSource,
     /// Functions that it calls, or that these call.
     pub inlined: Vec<InlinedSource>,
-    /// What the registers held when this was taken, from which it is guessed what they will hold. May be
-    /// shorter than the registers, and may be wrong: then the machine code is left with
+    /// The kinds of the registers when this was taken, which are the guess for later runs. May be shorter
+    /// than the registers, and may be wrong: then the machine code is left with
     /// [`GUESSED_WRONG`](crate::abi::GUESSED_WRONG).
     pub guesses: Vec<Known>,
     /// The first word of an [`EntryStub`](crate::abi::EntryStub).
@@ -135,7 +135,7 @@ impl MachineCodeMaker {
             defined = module.finalize_definitions();
         }
         if let Err(error) = defined {
-            // SAFETY: nobody has an address of it. Dropped, it would keep its memory.
+            // SAFETY: no address of it exists elsewhere. Dropped, it would keep its memory.
             unsafe { module.free_memory() };
             return Err(match error {
                 ModuleError::Compilation(CodegenError::Verifier(faults)) => {
@@ -190,13 +190,13 @@ pub struct MachineCode {
     said: Vec<SaidFrame>,
 }
 
-/// What is known of registers in the frame of a function, or of an inlined one.
+/// The known kinds of registers in the frame of a function, or of an inlined one.
 struct SaidFrame {
     /// Address of its first instruction.
     words_at: u64,
     /// Registers of the frames below.
     base: usize,
-    /// What is known of the registers before each of its instructions.
+    /// The known kinds of the registers before each of its instructions.
     said: Vec<Option<Box<[Known]>>>,
 }
 
@@ -251,8 +251,8 @@ impl MachineCode {
 impl Drop for MachineCode {
     fn drop(&mut self) {
         if let Some(module) = self.module.take() {
-            // SAFETY: whoever drops machine code has seen to it that no task is in it, and that no entry
-            // leads to it any more.
+            // SAFETY: the owner of machine code drops it only when no task is in it and no entry leads to it
+            // any more.
             unsafe { module.free_memory() };
         }
     }

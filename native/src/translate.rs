@@ -35,7 +35,7 @@ pub(crate) struct Translator<'a, 'f> {
     pub(crate) variables: Vec<Variable>,
     /// The doubles of those that are known to be doubles.
     pub(crate) doubles: Vec<Variable>,
-    /// What is known of each register here.
+    /// The known kind of each register here.
     pub(crate) known: Vec<Known>,
     /// RegisterBits that hold doubles that are not in their places, or may hold such.
     pub(crate) kept_back: RegisterBits,
@@ -43,7 +43,7 @@ pub(crate) struct Translator<'a, 'f> {
     pub(crate) words: Vec<Option<Ssa>>,
     /// Results that are not tested yet.
     pub(crate) batch: Option<DoubleBatch>,
-    /// What was computed of doubles on all ways here, and is tested or in the batch.
+    /// The results of operations on doubles on all paths to here, tested or in the batch.
     pub(crate) results: HashMap<(Arithmetic, Ssa, Ssa), Ssa>,
     /// The lengths of what is known to be simple vectors on all ways here.
     pub(crate) lengths: HashMap<Ssa, Ssa>,
@@ -204,7 +204,7 @@ impl<'a, 'f> Translator<'a, 'f> {
                 let tag = self.b.ins().band_imm_s(value, 3);
                 self.refuse(tag, wrong);
             }
-            // Who leaves later puts it back, read or not.
+            // A later exit spills it, read or not.
             Known::Double => {
                 let wrong = self.way_out(at, GUESSED_WRONG);
                 let double = self.double_of(value, wrong);

@@ -25,9 +25,9 @@ use crate::{
 pub struct Divergence {
     /// Number of the record, from 1 on.
     pub record: usize,
-    /// What the program asks.
+    /// The question of the program.
     pub asked: String,
-    /// What it asked when it was recorded.
+    /// The recorded question.
     pub recorded: String,
     /// The last check in which both were equal.
     pub equal: Option<RunCheck>,
@@ -47,8 +47,7 @@ impl fmt::Display for Divergence {
     }
 }
 
-/// What answers are taken from. Without records there is a world without anything, whose time passes when
-/// somebody waits.
+/// The source of answers. Without records it is an empty world, whose time passes during waits.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 enum AnswerSource {
     /// The records.
@@ -80,7 +79,7 @@ struct ReplayProgress {
     comes_back: bool,
 }
 
-/// What is done with the output of a replay: called with each piece.
+/// Receives the output of a replay, piece by piece.
 type OutputScreen = Box<dyn FnMut(Output, &[u8]) + Send>;
 
 /// A host that replays recorded answers. It captures what the program writes.
@@ -170,8 +169,8 @@ impl ReplayHost {
         self.captured.clone()
     }
 
-    /// Gives up the replay: from here on the program has a world without anything, in which time passes when
-    /// somebody waits. So a form can be evaluated in the middle of it. What it writes is captured.
+    /// Gives up the replay: from here on the program has an empty world, whose time passes during waits. So a
+    /// form can be evaluated in the middle of it. Its output is captured.
     pub fn detach(&self) {
         self.progress().source = AnswerSource::Nothing;
         *self.screen.lock().unwrap_or_else(PoisonError::into_inner) = None;

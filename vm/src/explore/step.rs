@@ -78,7 +78,7 @@ pub enum ScheduleEvent {
     Switch(Switch),
     /// A task has read or set a special variable of the program that it has not bound.
     Use {
-        /// What reports call the task.
+        /// Name of the task in reports.
         task: String,
         /// Name of the variable.
         variable: String,
@@ -95,7 +95,7 @@ pub type TellStep<'a> = dyn FnMut(ScheduleStep) + 'a;
 /// A task at a place of the program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StandingTask {
-    /// What reports call the task.
+    /// Name of the task in reports.
     pub label: String,
     /// Where it stands, as `file:line:column`, if it has begun.
     pub place: Option<String>,

@@ -192,8 +192,8 @@ unsafe fn end_native(
                 Signal::Next
             }
             FramePlace::Above => substitute(vm),
-            // What is called in an interrupted task is written in ESL; were it not, the task would just go
-            // on.
+            // Functions called in an interrupted task are written in ESL; after a builtin, the task would
+            // just go on.
             FramePlace::Interrupt => {
                 vm.restore_wait();
                 Signal::Reload
@@ -307,7 +307,7 @@ impl Vm {
         }
     }
 
-    /// Makes a function ready to be called: one that nobody has called yet is loaded.
+    /// Makes a function ready to be called: at its first call it is loaded.
     ///
     /// # Errors
     /// [`Exit::Collect`] without room, or a failure if the image is damaged.

@@ -210,8 +210,7 @@ fn mark_more(
 }
 
 impl Vm {
-    /// What happens at a tick when none is left: a turn of the collector, and the end of the slice if it is
-    /// over.
+    /// Does the work of a safepoint: a turn of the collector, and the end of the slice if no tick is left.
     pub(super) fn safepoint(&mut self) -> Option<Leave> {
         // `ticks` is negative here: at least by the tick that was not there, and more if builtins have
         // overdrawn.
@@ -392,7 +391,7 @@ impl Vm {
         self.names.opaques.let_go();
     }
 
-    /// Begins a turn of the collector: notes where the running task stands, and tells whoever watches.
+    /// Begins a turn of the collector: notes where the running task stands, and tells the observers.
     /// Returns when it began, if the run is watched.
     fn begin_pause(&mut self) -> Option<u64> {
         if self.scheduler.running.is_some() {

@@ -4,7 +4,8 @@
 //! there is one: the way through general registers and back takes as long as a multiplication, and programs
 //! wait for it, since the result of one operation is what the next one needs.
 //!
-//! Not here: comparisons, which nobody waits for, and doubles in boxes, which are the numeric tower's.
+//! Not here: comparisons, whose results no operation waits for, and doubles in boxes, which are the numeric
+//! tower's.
 #![allow(unsafe_code)]
 
 use crate::value::Value;

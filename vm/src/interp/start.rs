@@ -26,7 +26,7 @@ const EXIT_WORDS: usize = 5;
 /// Offset in a task's stack of the base of its first frame.
 pub(super) const FIRST_BASE: u32 = 4;
 
-/// What a task begins with.
+/// The first call of a task.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FirstCall {
     function: Value,

@@ -2,9 +2,8 @@
 //! function returns to, where the function returns to that took the place of a failed instruction, and the
 //! one that ran where its task was interrupted.
 //!
-//! Opcode 0 and those from `0xC0` on are refused in files, so whoever meets one of these knows that the
-//! machine has put it there. (Because there is a 0, the loop's table of jumps begins there, and the opcode is
-//! its index as it is.)
+//! Opcode 0 and those from `0xC0` on are refused in files, so code with one of these was made by the machine.
+//! (Because there is a 0, the loop's table of jumps begins there, and the opcode is its index as it is.)
 //!
 //! A return reads the call word two words before the return address, so each stub is a call word, its aux
 //! word, and then the operation that goes on.

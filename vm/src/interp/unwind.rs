@@ -208,7 +208,7 @@ pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value
         vm.exchange.values = values;
     }
     if task.flags.attention() {
-        // What waited for the end of the cleanup waits no longer.
+        // Requests that waited for the end of the cleanup are delivered now.
         vm.exchange.charges.end_slice();
     }
     vm.close_cleanup_memory();
@@ -289,7 +289,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
         let Some(entry) = task.control.entries.pop() else { return Signal::Reload };
         match entry.kind {
             EntryKind::FailureCleanup if !unwinding.target.is_final() => {
-                // What passes is no failure.
+                // The unwinding is not that of a failure.
                 task.control.unwinding = Some(unwinding);
             }
             EntryKind::Cleanup | EntryKind::FailureCleanup => {
@@ -298,7 +298,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                     || unwinding.target.is_final() && vm.scheduler.task().flags.abort_pending();
                 let allowance = if is_forced { vm.allow_cleanup(unwinding.target, height - 1) } else { None };
                 if is_forced && allowance.is_none() {
-                    // What these cleanups may use together is spent.
+                    // The common allowance of these cleanups is spent.
                     vm.scheduler.task_mut().control.unwinding = Some(unwinding);
                 } else {
                     let running =

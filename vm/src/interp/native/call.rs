@@ -106,7 +106,7 @@ unsafe fn arrange(
 /// where the loop calls it: what the list holds is kept by the collector.
 ///
 /// # Errors
-/// What is to be said of the call if that is another outcome.
+/// The reply for the call if it has another outcome.
 ///
 /// # Safety
 /// That of a helper, at a call of the builtin with this number.

@@ -59,7 +59,7 @@ unsafe fn hot_ticks(code: *mut CodeObject) -> u32 {
 }
 
 /// Counts a call at which machine code was left, and makes machine code of the callee if there were many.
-/// What the arguments are now is the guess of what they will be.
+/// The kinds of the present arguments are the guess for those of later calls.
 ///
 /// # Safety
 /// `pc` is the address of an instruction of the frame `base`.

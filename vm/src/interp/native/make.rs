@@ -21,7 +21,7 @@ use crate::vm::Vm;
 /// Most bytes of machine code of one machine.
 const MOST_BYTES: usize = 32 << 20;
 
-/// What part of the memory of the heap machine code may have at most: one in so many.
+/// Largest fraction of the heap's memory that machine code may take: one in so many.
 const PART_OF_HEAP: usize = 8;
 
 /// Most orders that are given and not answered.
@@ -232,7 +232,7 @@ unsafe fn install(compiled: &mut CompiledFunctions, order: CodeOrder, result: Re
             return;
         }
     };
-    // SAFETY: by the contract this is a live Code, and nobody holds a reference to its words.
+    // SAFETY: by the contract this is a live Code, and no reference to its words exists.
     unsafe {
         let code = Value::from_bits(order.code).object_ptr().cast::<CodeObject>();
         let words = instructions(code).len();
@@ -278,7 +278,7 @@ unsafe fn install(compiled: &mut CompiledFunctions, order: CodeOrder, result: Re
 /// # Safety
 /// `code` is a live Code, and no machine code runs.
 pub(super) unsafe fn uninstall(compiled: &mut CompiledFunctions, code: *mut CodeObject) {
-    // SAFETY: by the contract; nobody holds a reference to the words of a code.
+    // SAFETY: by the contract; no reference to the words of a code exists.
     unsafe {
         if *(*code).entry != u32::from(stubs::NATIVE_ENTRY) {
             return;

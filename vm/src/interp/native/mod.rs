@@ -5,7 +5,7 @@
 //! the loop goes on with the instruction at which it was left, as if it had run all before.
 //!
 //! The entry word of a Code leads to its first instruction, to the stub of its machine code, or to
-//! [`MAKE_AT_ENTRY`]. So nobody but the arms of the loop that make frames goes by it; a task that stands at
+//! [`MAKE_AT_ENTRY`]. Only the arms of the loop that make frames go by it; a task that stands at
 //! the beginning of a function stands at the first instruction.
 
 mod call;
@@ -70,7 +70,7 @@ pub(super) struct Leaving {
     pub(super) ticks: i32,
 }
 
-/// What helpers find behind `NativeContext::machine`.
+/// The data of helpers behind `NativeContext::machine`.
 struct Caller {
     vm: *mut Vm,
     signal: Signal,
@@ -139,7 +139,7 @@ pub(super) unsafe fn enter_at_loop(
 /// `pc` is at a loop instruction of a Code.
 #[cold]
 unsafe fn calm_loop(pc: *const u32) {
-    // SAFETY: by the contract this is a word of a code, and nobody holds a reference to it.
+    // SAFETY: by the contract this is a word of a code, and no reference to it exists.
     unsafe { *pc.cast_mut() = word_at(pc).0 };
 }
 
@@ -152,7 +152,7 @@ fn rouse_loops(compiled: &mut CompiledFunctions) {
                 continue;
             }
             // SAFETY: the word was made of the address of a code, which is there: else this had been given
-            // back when all that is reached had been marked. Nobody holds a reference to its words.
+            // back when all that is reached had been marked. No reference to its words exists.
             unsafe {
                 let code = Value::from_bits(installed.order.code).object_ptr().cast::<CodeObject>();
                 let words = instructions(code).len();

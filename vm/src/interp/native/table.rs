@@ -73,7 +73,7 @@ unsafe fn end_lookup(context: *mut NativeContext, found: Option<Value>) -> u64 {
     value.bits()
 }
 
-/// What is done with a key.
+/// The operation on a key.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum LookupDeed {
     /// A `gethash` that wants one value, given the default.

@@ -24,8 +24,8 @@ impl Numbers {
     }
 }
 
-/// What registers hold at first: a fixnum, doubles with and without a box, zero, a large integer, a vector, a
-/// pair, and something that fits nowhere.
+/// The first contents of registers: a fixnum, doubles with and without a box, zero, a large integer, a
+/// vector, a pair, and something that fits nowhere.
 const VALUES: &[&str] = &[
     "load-int % 3",
     "load-int % 1",
