@@ -182,7 +182,7 @@ fn describe_symbol(heap: &Heap, symbol: Value, text: &mut String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::{Shape, Sort};
+    use crate::shape::{CodeKind, Shape};
     use crate::trust::{self, heap_for_tests};
 
     #[test]
@@ -190,7 +190,7 @@ mod tests {
         let mut heap = heap_for_tests();
         let mut name = Value::small(7);
         for level in 0..100_000 {
-            let shape = Shape::other(Sort::Undefined, 0);
+            let shape = Shape::other(CodeKind::Undefined, 0);
             let code =
                 trust::alloc_stub(&mut heap, name, Value::NIL, shape, 1, trust::UNDEFINED_WORD).unwrap();
             name = trust::alloc_function(&mut heap, code, &[Value::NIL]).unwrap();

@@ -17,10 +17,10 @@
 
 use esl_bytecode::module::{Capture, CaptureSource, Parameters};
 
-/// The sort of a Code.
+/// The kind of a Code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub(crate) enum Sort {
+pub(crate) enum CodeKind {
     /// Instructions, ready to run.
     Bytecode = 0,
     /// A builtin: its number is in the shape.
@@ -31,11 +31,11 @@ pub(crate) enum Sort {
     Lazy = 3,
 }
 
-/// Sort and parameters of a Code.
+/// Kind and parameters of a Code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Shape {
-    /// The sort.
-    pub sort: Sort,
+    /// The kind.
+    pub kind: CodeKind,
     /// Number of required parameters.
     pub required: u8,
     /// Number of optional parameters.
@@ -54,7 +54,7 @@ impl Shape {
     /// The shape of bytecode that takes these parameters.
     pub(crate) fn bytecode(parameters: &Parameters) -> Shape {
         Shape {
-            sort: Sort::Bytecode,
+            kind: CodeKind::Bytecode,
             required: parameters.required,
             optional: parameters.optional,
             rest: parameters.rest,
@@ -64,10 +64,10 @@ impl Shape {
         }
     }
 
-    /// The shape of a Code of another sort; `number` is that of a builtin, else 0.
-    pub(crate) fn other(sort: Sort, number: u16) -> Shape {
+    /// The shape of a Code of another kind; `number` is that of a builtin, else 0.
+    pub(crate) fn other(kind: CodeKind, number: u16) -> Shape {
         Shape {
-            sort,
+            kind,
             required: 0,
             optional: 0,
             rest: false,
@@ -81,7 +81,7 @@ impl Shape {
     pub(crate) fn pack(self) -> u64 {
         let flags =
             u64::from(self.rest) | u64::from(self.takes_keys) << 1 | u64::from(self.allow_other_keys) << 2;
-        self.sort as u64
+        self.kind as u64
             | u64::from(self.required) << 8
             | u64::from(self.optional) << 16
             | flags << 24
@@ -91,19 +91,19 @@ impl Shape {
     /// Returns whether packed bits are those of instructions that are ready to run.
     #[inline(always)]
     pub(crate) fn is_bytecode(bits: u64) -> bool {
-        bits as u8 == Sort::Bytecode as u8
+        bits as u8 == CodeKind::Bytecode as u8
     }
 
     /// Reads what [`Shape::pack`] made.
     pub(crate) fn unpack(bits: u64) -> Shape {
-        let sort = match bits as u8 {
-            1 => Sort::Native,
-            2 => Sort::Undefined,
-            3 => Sort::Lazy,
-            _ => Sort::Bytecode,
+        let kind = match bits as u8 {
+            1 => CodeKind::Native,
+            2 => CodeKind::Undefined,
+            3 => CodeKind::Lazy,
+            _ => CodeKind::Bytecode,
         };
         Shape {
-            sort,
+            kind,
             required: (bits >> 8) as u8,
             optional: (bits >> 16) as u8,
             rest: bits >> 24 & 1 != 0,
@@ -143,7 +143,7 @@ mod tests {
         let parameters = Parameters { required: 200, optional: 3, rest: true, keys, allow_other_keys: true };
         let shape = Shape::bytecode(&parameters);
         assert_eq!(Shape::unpack(shape.pack()), shape);
-        let native = Shape::other(Sort::Native, 700);
+        let native = Shape::other(CodeKind::Native, 700);
         assert_eq!(Shape::unpack(native.pack()), native);
     }
 

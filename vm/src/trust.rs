@@ -14,7 +14,7 @@ use esl_bytecode::verify::{VerifyError, verify_function, verify_outline};
 
 use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap, HeapConfig, HeapImage};
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::value::Value;
 
 /// The code of a symbol without a function; the symbol is capture 0 of the function. As the next two, it
@@ -141,7 +141,7 @@ pub(crate) fn alloc_stub(
     captures: usize,
     word: u32,
 ) -> Result<Value, AllocError> {
-    assert_ne!(shape.sort, Sort::Bytecode, "a stub is no bytecode");
+    assert_ne!(shape.kind, CodeKind::Bytecode, "a stub is no bytecode");
     let parts = CodeParts {
         name,
         debug: Value::NIL,
@@ -159,13 +159,13 @@ pub(crate) fn alloc_stub(
 
 /// Whether code reads captures of its function: only bytecode does, and `spare[1]` says how many.
 fn reads_captures(code: &CodeObject) -> bool {
-    Shape::unpack(code.spare[0]).sort == Sort::Bytecode && code.spare[1] != 0
+    Shape::unpack(code.spare[0]).kind == CodeKind::Bytecode && code.spare[1] != 0
 }
 
 /// Whether the code of a function is bytecode and no stub; `None` if `function` is none.
 fn is_bytecode(heap: &Heap, function: Value) -> Option<bool> {
     let code = heap.code(heap.function_code(function)?)?;
-    Some(Shape::unpack(code.spare[0]).sort == Sort::Bytecode)
+    Some(Shape::unpack(code.spare[0]).kind == CodeKind::Bytecode)
 }
 
 /// Creates a function of code that reads no captures. The code that replaces a stub reads its captures.

@@ -22,7 +22,7 @@ pub(crate) use host::{macro_call, with_compiler};
 use crate::heap::Heap;
 use crate::heap::layout::SymbolObject;
 use crate::names::{Names, find_builtin};
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -210,14 +210,14 @@ fn function_info(vm: &Vm, object: Value) -> GlobalFunction {
 pub(crate) fn arity(vm: &Vm, function: Value) -> Option<Arity> {
     let code = vm.heap.code(vm.heap.function_code(function)?)?;
     let shape = Shape::unpack(code.spare[0]);
-    match shape.sort {
-        Sort::Native => BUILTINS.get(usize::from(shape.number)).map(|info| info.arity),
-        Sort::Undefined => None,
-        Sort::Lazy => {
+    match shape.kind {
+        CodeKind::Native => BUILTINS.get(usize::from(shape.number)).map(|info| info.arity),
+        CodeKind::Undefined => None,
+        CodeKind::Lazy => {
             let (image, number) = crate::names::load::image_origin(&vm.heap, function)?;
             Some(arity_of(&vm.names.images.decode(image, number)?.parameters))
         }
-        Sort::Bytecode => {
+        CodeKind::Bytecode => {
             let min = u32::from(shape.required);
             let has_more = shape.rest || shape.takes_keys;
             Some(Arity { min, max: if has_more { None } else { Some(min + u32::from(shape.optional)) } })

@@ -10,7 +10,7 @@ use esl_bytecode::symbol::Symbol;
 use super::object_for;
 use crate::names::find_builtin;
 use crate::names::load::{debug_texts, image_origin};
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -36,10 +36,10 @@ fn of_function(vm: &Vm, function: Value) -> Option<Signature> {
     }
     let code = vm.heap.code(vm.heap.function_code(function)?)?;
     let shape = Shape::unpack(code.spare[0]);
-    match shape.sort {
-        Sort::Native => BUILTINS.get(usize::from(shape.number)).map(of_builtin),
-        Sort::Undefined | Sort::Lazy => None,
-        Sort::Bytecode => {
+    match shape.kind {
+        CodeKind::Native => BUILTINS.get(usize::from(shape.number)).map(of_builtin),
+        CodeKind::Undefined | CodeKind::Lazy => None,
+        CodeKind::Bytecode => {
             let (lambda_list, _) = debug_texts(&vm.heap, code.debug)?;
             let unit = &mut vm.compiler.unit.borrow_mut();
             let lambda_list = unit.datum_or_object(&vm.heap, &vm.names, lambda_list, Span::default());

@@ -9,7 +9,7 @@ use crate::interp::frames::entry_word;
 use crate::names::Names;
 use crate::outside::Outside;
 use crate::schedule::{Due, Scheduler};
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::state::{
     VisitCompiler, VisitControl, VisitCourse, VisitExtra, VisitNames, VisitOutside, VisitRunning,
     VisitScheduler, VisitTask, VisitVm,
@@ -254,7 +254,7 @@ pub(super) fn is_of_program(heap: &Heap, function: Value) -> bool {
     let code = heap.function_code(function).and_then(|code| heap.code(code));
     code.is_some_and(|code| {
         let is_of_image = code.owner.as_index().is_some() && code.debug.as_index().is_some();
-        !is_of_image && Shape::unpack(code.spare[0]).sort == Sort::Bytecode
+        !is_of_image && Shape::unpack(code.spare[0]).kind == CodeKind::Bytecode
     })
 }
 

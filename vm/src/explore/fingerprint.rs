@@ -33,7 +33,7 @@ use crate::interp::frames::Frames;
 use crate::names::load::image_origin;
 use crate::names::{GivenMap, Names};
 use crate::schedule::Grain;
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::state::{VisitCourse, VisitVm};
 use crate::table::Table;
 use crate::task::{Task, TaskEnd, UnwindTarget, Unwinding};
@@ -205,10 +205,10 @@ impl Vm {
     }
 }
 
-/// Sort of the code of a function.
-pub(super) fn sort_of(heap: &Heap, function: Value) -> Option<Sort> {
+/// Kind of the code of a function.
+pub(super) fn code_kind(heap: &Heap, function: Value) -> Option<CodeKind> {
     let code = heap.code(heap.function_code(function)?)?;
-    Some(Shape::unpack(code.spare[0]).sort)
+    Some(Shape::unpack(code.spare[0]).kind)
 }
 
 /// One walk through a state.
@@ -492,13 +492,13 @@ impl Walk<'_> {
         self.digest.add_all([code.0, code.1].into_iter());
         // A lazy function of the library has its number in the place of captures.
         let heap = &self.vm.heap;
-        let count = match sort_of(heap, function) {
-            Some(Sort::Lazy) | None => 0,
-            Some(Sort::Bytecode) => {
+        let count = match code_kind(heap, function) {
+            Some(CodeKind::Lazy) | None => 0,
+            Some(CodeKind::Bytecode) => {
                 let code = heap.function_code(function).and_then(|code| heap.code(code));
                 code.map_or(0, |code| code.spare[1] as usize)
             }
-            Some(Sort::Native | Sort::Undefined) => usize::MAX,
+            Some(CodeKind::Native | CodeKind::Undefined) => usize::MAX,
         };
         let captures = heap.function_captures(function).unwrap_or_default();
         self.values(&captures[..captures.len().min(count)]);

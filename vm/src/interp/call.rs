@@ -14,7 +14,7 @@ use super::{Signal, aux_at, code_of, constant, failure, first_instruction, pc_as
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::Arguments;
 use crate::raise::{Exit, Raised};
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -96,7 +96,7 @@ pub(super) unsafe fn call(
         let code = code_of(function);
         (code, Shape::unpack((*code).spare[0]))
     };
-    if shape.sort == Sort::Native {
+    if shape.kind == CodeKind::Native {
         // SAFETY: by the contract the arguments stay where they are until the call is made; a frame of this
         // place has room for them.
         return unsafe { call_native(vm, shape.number, arguments, place) };
@@ -264,7 +264,7 @@ pub(super) unsafe fn call_requested(vm: &mut Vm, place: FramePlace) -> Signal {
         // of `call` holds.
         unsafe {
             let shape = Shape::unpack((*code_of(function)).spare[0]);
-            if shape.sort != Sort::Native {
+            if shape.kind != CodeKind::Native {
                 return call(vm, function, &*arguments, place);
             }
             match apply_native(vm, shape.number, &*arguments) {
@@ -296,10 +296,10 @@ impl Vm {
         };
         // SAFETY: this is a Function, by its kind or because the heap guarantees it of the function of a
         // symbol.
-        let sort = unsafe { Shape::unpack((*code_of(function)).spare[0]).sort };
-        match sort {
-            Sort::Undefined => self.exchange.raise(Raised::UndefinedFunction(callee)),
-            Sort::Lazy => {
+        let kind = unsafe { Shape::unpack((*code_of(function)).spare[0]).kind };
+        match kind {
+            CodeKind::Undefined => self.exchange.raise(Raised::UndefinedFunction(callee)),
+            CodeKind::Lazy => {
                 self.make_ready(function)?;
                 Ok(function)
             }

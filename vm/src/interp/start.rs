@@ -10,7 +10,7 @@ use super::{code_of, first_instruction, stubs};
 use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap};
 use crate::saved_pc::SavedPc;
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::stack::Stack;
 use crate::task::LazyControl;
 use crate::task::Task;
@@ -43,7 +43,7 @@ impl FirstCall {
     pub(crate) fn new(heap: &Heap, function: Value, arguments: Value) -> FirstCall {
         let code = heap.function_code(function).unwrap_or(Value::NIL);
         let is_direct = |code: &CodeObject| {
-            arguments.is_nil() && code.arity == 0 && Shape::unpack(code.spare[0]).sort == Sort::Bytecode
+            arguments.is_nil() && code.arity == 0 && Shape::unpack(code.spare[0]).kind == CodeKind::Bytecode
         };
         let direct = heap.code(code).filter(|code| is_direct(code)).map(|code| code.nregs);
         FirstCall { function, arguments, code, direct }

@@ -8,7 +8,7 @@ use crate::describe::describe;
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::{Exit, Raised};
 use crate::schedule::VariableUse;
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::task::{Binding, TaskNumber};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -106,7 +106,7 @@ pub(super) unsafe fn function_ref(vm: &mut Vm, pc: *const u32, base: *mut Value)
         let word = word_at(pc);
         let symbol = constant(base, word.d());
         let function = (*symbol.object_ptr().cast::<SymbolObject>()).function;
-        if Shape::unpack((*code_of(function)).spare[0]).sort == Sort::Undefined {
+        if Shape::unpack((*code_of(function)).spare[0]).kind == CodeKind::Undefined {
             return failure(vm, Raised::UndefinedFunction(symbol));
         }
         *base.add(word.a()) = function;

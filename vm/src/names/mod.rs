@@ -25,7 +25,7 @@ use indexmap::IndexMap;
 
 use crate::heap::layout::SymbolObject;
 use crate::heap::{AllocError, Heap, Holder, Kind};
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::trust;
 use crate::value::Value;
 pub(crate) use builtin_index::find_builtin;
@@ -131,7 +131,7 @@ impl Names {
     /// # Errors
     /// [`AllocError`] if the heap is too small for it.
     pub(crate) fn new(heap: &mut Heap) -> Result<Names, AllocError> {
-        let shape = Shape::other(Sort::Undefined, 0);
+        let shape = Shape::other(CodeKind::Undefined, 0);
         let undefined = trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 1, trust::UNDEFINED_WORD)?;
         let mut names = Names {
             known: Known::NONE,
@@ -334,7 +334,7 @@ impl Names {
 
     fn make_builtin(&mut self, heap: &mut Heap, builtin: Builtin, name: Value) -> Result<Value, AllocError> {
         let number = builtin.number();
-        let shape = Shape::other(Sort::Native, number as u16);
+        let shape = Shape::other(CodeKind::Native, number as u16);
         let code = trust::alloc_stub(heap, name, Value::NIL, shape, 0, trust::native_word(builtin))?;
         trust::alloc_function(heap, code, &[])
     }

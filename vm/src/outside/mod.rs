@@ -79,7 +79,7 @@ pub(crate) struct Outside {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ExpectedOperators {
     /// None can come.
-    Nobody,
+    None,
     /// They may come at any time.
     MayCome,
     /// They may, and it was said that the run waits for them.
@@ -105,7 +105,7 @@ impl Outside {
             operations: Operations::default(),
             inputs: BTreeMap::new(),
             senders: 0,
-            attendance: ExpectedOperators::Nobody,
+            attendance: ExpectedOperators::None,
             complaints: Output::Error,
             exit_status: None,
         }

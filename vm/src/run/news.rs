@@ -26,7 +26,7 @@ fn expects_operation(vm: &Vm) -> bool {
 
 /// Returns whether a task waits for an input that an operator may still attach to signal.
 fn awaits_operator(vm: &Vm) -> bool {
-    vm.outside.attendance != ExpectedOperators::Nobody
+    vm.outside.attendance != ExpectedOperators::None
         && vm.outside.inputs.values().any(|&input| event::is_awaited(&vm.heap, input))
 }
 

@@ -18,7 +18,7 @@ pub(crate) enum AccountOwner {
     /// All tasks that charge it.
     Tasks,
     /// Nothing: the form was left before the account was spent.
-    Nobody,
+    None,
 }
 
 /// The unit that an account counts.
@@ -86,7 +86,7 @@ impl Stated for AccountOwner {
         match self {
             AccountOwner::Form(task, limit) => (*task, *limit).tell(sink),
             AccountOwner::Tasks => sink.word(1),
-            AccountOwner::Nobody => sink.word(2),
+            AccountOwner::None => sink.word(2),
         }
     }
 }
@@ -107,7 +107,7 @@ impl Account {
             && match self.owner {
                 AccountOwner::Tasks => true,
                 AccountOwner::Form(owner, _) => owner != task,
-                AccountOwner::Nobody => false,
+                AccountOwner::None => false,
             }
     }
 }
@@ -158,7 +158,7 @@ impl Accounts {
     pub(crate) fn close_form(&mut self, id: AccountId) -> bool {
         let Some(account) = self.get_mut(id) else { return false };
         // Tasks made inside that have not had their turn since it was spent are still to end.
-        account.owner = if account.is_spent { AccountOwner::Tasks } else { AccountOwner::Nobody };
+        account.owner = if account.is_spent { AccountOwner::Tasks } else { AccountOwner::None };
         self.leave(id);
         true
     }
@@ -212,7 +212,7 @@ impl Accounts {
     ) -> Result<(), Vec<(TaskIndex, LimitNumber)>> {
         let (mut admits, mut expired) = (true, Vec::new());
         self.each_of(id, measure, |account| {
-            if account.left <= 0 && !account.is_spent && account.owner != AccountOwner::Nobody {
+            if account.left <= 0 && !account.is_spent && account.owner != AccountOwner::None {
                 account.spend(&mut expired);
                 admits = false;
             }
@@ -286,7 +286,7 @@ impl Accounts {
     pub(crate) fn visit_left(&self, id: AccountId, visit: &mut dyn FnMut(u64)) {
         let mut id = id;
         while let Some(account) = self.get(id) {
-            if account.owner != AccountOwner::Nobody {
+            if account.owner != AccountOwner::None {
                 visit(account.left as u64 ^ u64::from(account.is_spent) << 63);
             }
             id = account.parent;
@@ -297,8 +297,7 @@ impl Accounts {
     pub(crate) fn left(&self, id: AccountId) -> u64 {
         let (mut id, mut least) = (id, i64::MAX);
         while let Some(account) = self.get(id) {
-            if account.measure == Measure::Ticks && account.owner != AccountOwner::Nobody && account.left > 0
-            {
+            if account.measure == Measure::Ticks && account.owner != AccountOwner::None && account.left > 0 {
                 least = least.min(account.left);
             }
             id = account.parent;

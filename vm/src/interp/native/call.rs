@@ -11,7 +11,7 @@ use super::make_words;
 use super::step::{attend, leave, parts};
 use crate::heap::layout::CodeObject;
 use crate::raise::Exit;
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::value::Value;
 
 /// Does what is left of a call: see [`NativeContext::call_other`].
@@ -29,7 +29,7 @@ pub(super) unsafe extern "C" fn call_other(
         let (code, word) = (code_of(function), word_at(pc));
         let window = base.add(word.a());
         let shape = Shape::unpack((*code).spare[0]);
-        if shape.sort != Sort::Native {
+        if shape.kind != CodeKind::Native {
             let arranged = arrange(context, pc, base, code, window.add(2));
             return arranged.map_or(CALL_AGAIN, |(address, _)| address);
         }
@@ -58,7 +58,7 @@ pub(super) unsafe extern "C" fn tail_call_other(
         let Some(function) = callee_at(pc, base) else { return CALL_AGAIN };
         let code = code_of(function);
         let shape = Shape::unpack((*code).spare[0]);
-        if shape.sort != Sort::Native {
+        if shape.kind != CodeKind::Native {
             let Some((address, parameters)) = arrange(context, pc, base, code, base) else {
                 return CALL_AGAIN;
             };

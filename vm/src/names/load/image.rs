@@ -21,7 +21,7 @@ use super::definitions::{Definitions, ImageDefinition, name_of};
 use super::{LoadError, LoadedFunction, character, data, debug, integer, make_code, own_constants, ratio};
 use crate::heap::{AllocError, Heap};
 use crate::names::Names;
-use crate::shape::{Shape, Sort};
+use crate::shape::{CodeKind, Shape};
 use crate::trust::LAZY_WORD;
 use crate::trust::{self, Verified};
 use crate::value::Value;
@@ -121,7 +121,7 @@ impl Images {
 pub(crate) fn open(heap: &mut Heap, names: &mut Names, module: Arc<ModuleImage>) -> Result<Value, LoadError> {
     let number = names.images.0.len();
     let packages = module.packages()?.into_iter().map(Arc::from).collect();
-    let shape = Shape::other(Sort::Lazy, 0);
+    let shape = Shape::other(CodeKind::Lazy, 0);
     let image = Image {
         packages,
         definitions: Definitions::of(&module)?,
@@ -394,8 +394,8 @@ pub(super) fn texts(
 pub(crate) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
     let code = heap.code(heap.function_code(function)?)?;
     let image = code.owner.as_index()?;
-    let number = match Shape::unpack(code.spare[0]).sort {
-        Sort::Lazy => heap.function_captures(function)?.first()?.as_index()?,
+    let number = match Shape::unpack(code.spare[0]).kind {
+        CodeKind::Lazy => heap.function_captures(function)?.first()?.as_index()?,
         _ => code.debug.as_index()?,
     };
     Some((image, number as u32))
@@ -411,7 +411,7 @@ impl Names {
         let is_lazy = heap
             .function_code(function)
             .and_then(|code| heap.code(code))
-            .is_some_and(|code| Shape::unpack(code.spare[0]).sort == Sort::Lazy);
+            .is_some_and(|code| Shape::unpack(code.spare[0]).kind == CodeKind::Lazy);
         let Some((image, number)) = origin(heap, function).filter(|_| is_lazy) else { return Ok(0) };
         let code = ImageLoader { heap, names: self, image }.code(FunctionNumber(number))?;
         trust::replace_stub(heap, function, code);

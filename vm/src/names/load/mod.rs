@@ -28,7 +28,7 @@ use crate::fused::fuse;
 use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap, Kind};
 use crate::names::Names;
-use crate::shape::{Shape, Sort, capture_word};
+use crate::shape::{CodeKind, Shape, capture_word};
 use crate::trust::LAZY_WORD;
 use crate::trust::{self, Verification, Verified};
 use crate::value::Value;
@@ -219,7 +219,7 @@ impl<M: Borrow<Module>> ModuleLoad<M> {
         };
         // Data may contain functions, and functions each other, so functions are made before their code.
         if stub.is_nil() {
-            let shape = Shape::other(Sort::Lazy, 0);
+            let shape = Shape::other(CodeKind::Lazy, 0);
             *stub = trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 0, LAZY_WORD)?;
         }
         while let Some(function) = module.functions.get(functions.len()) {
@@ -434,7 +434,7 @@ impl Names {
         let code = heap.function_code(function).and_then(|code| heap.code(code)).copied();
         let Some(code) = code else { return Ok(None) };
         let shape = Shape::unpack(code.spare[0]);
-        if shape.sort == Sort::Native
+        if shape.kind == CodeKind::Native
             && let Some(info) = BUILTINS.get(usize::from(shape.number))
         {
             let documentation: Vec<&str> = info.doc.iter().map(|line| line.trim()).collect();
