@@ -978,8 +978,8 @@ macro_rules! for_each_builtin {
             /// the rights in force where that form stands, until the mask is popped that is on top of the
             /// control stack. Returns the function of recovery procedures.
             LendRights = rights::lend_rights, internal "%LEND-RIGHTS" ("index data");
-            /// Fails unless the program has a right, a keyword, to an object. What to use in its place: for a
-            /// path the one to which its links lead.
+            /// Fails unless the program has a right, a keyword, to an object. Returns the object to use in
+            /// its place: for a path the one to which its links lead.
             DemandRight = rights::demand_right, internal "%DEMAND-RIGHT" ("right object");
             /// Calls the embedder's function of this name, a symbol, with a list of arguments.
             CallHost = outside::call_host, internal "%CALL-HOST" ("name arguments");

@@ -131,7 +131,7 @@ impl Linker {
         self.linked.toplevel.extend(module.toplevel.into_iter().map(|number| places.function(number)));
     }
 
-    /// Changes what `constant` refers to. What it refers to has its place already.
+    /// Renumbers the references of `constant`, whose targets have their places already.
     fn renumber(&mut self, constant: &mut Constant, places: &Places) {
         match constant {
             Constant::Symbol(symbol) | Constant::Class(symbol) => self.renumber_symbol(symbol),

@@ -2,7 +2,7 @@
 //!
 //! `cover` puts a [`NodeKind::Pass`] in front of the forms of a top-level form: before each that may be
 //! evaluated more or less often than what is around it, as the arms of an `if`, and before each that begins
-//! a line of the source. What a macro makes has the place of the macro's call and is not counted apart.
+//! a line of the source. The expansion of a macro has the place of the macro's call and is not counted apart.
 //!
 //! Guarantees: the meaning of the form stays, and its ticks. Not here: which places are the clauses of the
 //! forms that people know (the package `esl-lang`).

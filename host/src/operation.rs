@@ -1,8 +1,8 @@
 //! Operations as the outside sees them: what it does for a task, and what becomes of it.
 //!
 //! Guarantees: an operation has one end, however the host's code behaves: it cannot be completed twice, and
-//! one that is dropped without an end has failed. What is said of an operation after the end of its machine
-//! has no effect.
+//! one that is dropped without an end has failed. News of an operation after the end of its machine have no
+//! effect.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

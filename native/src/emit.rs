@@ -354,8 +354,8 @@ impl Translator<'_, '_> {
         self.refuse(outcome, signal);
     }
 
-    /// Has the machine do a test, then goes to one of two blocks. What the machine does may be charged, so on
-    /// a short way, which is begun again, the machine code is left in its place.
+    /// Has the machine do a test, then goes to one of two blocks. The machine's work may be charged, so on a
+    /// short path, which is begun again, the machine code is left in its place.
     pub(crate) fn step_test(&mut self, jump: Block, next: Block) {
         if self.frame.is_begun_again() {
             let exit = self.exit();

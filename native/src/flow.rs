@@ -52,8 +52,8 @@ fn is_simple(words: &[u32], may_be_there: impl Fn(Opcode) -> bool) -> bool {
 const SHORT: usize = 4;
 
 /// Returns whether a short way leads from the instruction at a word to a return: past tests of registers, and
-/// what writes constants and registers to others than those of the arguments. What is done on it in machine
-/// code can be repeated from the beginning of the function.
+/// what writes constants and registers to others than those of the arguments. Its work in machine code can be
+/// repeated from the beginning of the function.
 fn returns_soon(words: &[u32], at: usize, arguments: u8, most: usize) -> bool {
     let Some(instr) = Instr::decode(words, at).filter(|_| most > 0) else { return false };
     let dst = match instr {

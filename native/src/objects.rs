@@ -69,7 +69,7 @@ impl Translator<'_, '_> {
         self.finish_effect(slow);
     }
 
-    /// An element of a simple vector. What is none, or is not there, fails by the interpreter. One that is
+    /// An element of a simple vector. The interpreter handles other arrays and invalid indexes. One that is
     /// guessed to be a double is kept back, and joins the batch.
     pub(crate) fn simple_element_ref(&mut self, dst: u8, vector: u8, index: ElementIndex) {
         if self.guess == Some(dst) {

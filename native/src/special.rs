@@ -1,5 +1,5 @@
-//! Special variables. What depends on the bindings of the task is done by functions of the machine, of which
-//! those that read or set a variable look at nothing of the frame: what is kept back stays so.
+//! Special variables. Functions of the machine do the work that depends on the bindings of the task. Those
+//! that read or set a variable read nothing of the frame: what is kept back stays so.
 
 use std::mem::offset_of;
 

@@ -3,7 +3,7 @@
 //! Near the limit of memory each of a thousand tasks could have everything collected for a few bytes, one
 //! after the other, so that a program that is out of memory would seem to hang. So collections have to be
 //! paid for: by the time of what runs between them, or by what is allocated there. Some are allowed in
-//! advance. What wants another one then is told that the heap is exhausted.
+//! advance. A further request then fails because the heap is exhausted.
 
 /// A collection is paid for by the allocation of one part in so many of the limit.
 const PART_OF_LIMIT: u64 = 64;

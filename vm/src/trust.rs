@@ -40,7 +40,7 @@ pub(crate) fn new_heap(config: HeapConfig) -> Heap {
 #[must_use]
 pub(crate) fn restore_heap(heap: &mut Heap, image: &HeapImage) -> bool {
     // SAFETY: `snapshot` takes the image together with all values that the machine holds, and puts these back
-    // together with it. What else holds values is asked for the same by the documentation of `Vm`.
+    // together with it. The documentation of `Vm` requires the same of other holders of values.
     unsafe { heap.restore(image) }
 }
 

@@ -203,7 +203,7 @@ impl Arena {
         let address = self.address(block);
         let counts = metadata::sweep(self.metadata_mut(block), epoch, |hole| {
             if cfg!(debug_assertions) {
-                // SAFETY: H2: a hole of a block just swept holds nothing that anyone will read.
+                // SAFETY: H2: a hole of a block just swept holds nothing that will be read.
                 unsafe { poison(address, hole) };
             }
         });

@@ -24,9 +24,9 @@ pub const MAX_LENGTH: usize = 1 << 31;
 
 /// Kind of an object.
 ///
-/// The numbers have a meaning: below 0x20 all slots are values, below 0x1F anyone may read them, from 0x40 on
-/// no slot is a value; the high half gives the size of an element. They may change with any version; nothing
-/// stores them outside of a running heap.
+/// The numbers have a meaning: below 0x20 all slots are values, below 0x1F all code may read them, from 0x40
+/// on no slot is a value; the high half gives the size of an element. They may change with any version;
+/// nothing stores them outside of a running heap.
 #[repr(u8)]
 #[derive(Copy, Clone, PartialEq, Eq, Debug, Hash)]
 pub enum Kind {
@@ -125,7 +125,7 @@ impl Kind {
         (self as u8) < 0x20
     }
 
-    /// Returns whether all slots are values that anyone may read. Those of a hash table are for its own
+    /// Returns whether all slots are values that all code may read. Those of a hash table are for its own
     /// functions, which rely on the content of the storage behind them.
     #[inline(always)]
     pub const fn is_open_record(self) -> bool {

@@ -359,7 +359,7 @@ impl Heap {
     /// Ends marking. Everything that was neither marked nor allocated in this cycle will be freed.
     ///
     /// # Safety
-    /// Every value that anyone will still use was marked, is reachable from what was marked, or was allocated
+    /// Every value that will still be used was marked, is reachable from a marked one, or was allocated
     /// since the cycle began.
     ///
     /// # Panics

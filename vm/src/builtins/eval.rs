@@ -20,8 +20,8 @@
 //! Diagnostics are a list of `(severity code text)`. The caller that begins a compilation ends it with
 //! `%end-compilation`.
 //!
-//! Guarantees: a step does a bounded part of the work, for which the task is charged. What compilations hold
-//! counts against the limit of the memory: beyond it, the next step fails for want of room.
+//! Guarantees: a step does a bounded part of the work, for which the task is charged. The data of
+//! compilations count against the limit of the memory: beyond it, the next step fails for want of room.
 
 use esl_bytecode::compile::{Compilation, CompileTimeFailure, Step, StepOutcome, Work};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};

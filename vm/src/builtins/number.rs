@@ -12,7 +12,7 @@ use super::LIMIT;
 /// The one of integers, where it is left out.
 const ONE: Value = Value::small(1);
 
-/// Joins numbers from the left. What several steps together may cost is bounded like one.
+/// Joins numbers from the left. The cost of all steps together is bounded like that of one.
 fn fold(
     vm: &mut Vm,
     first: Value,

@@ -32,7 +32,7 @@ impl Unit {
     /// Returns the environment that tells of these definitions.
     ///
     /// # Errors
-    /// [`AllocError`]. What was made so far is kept.
+    /// [`AllocError`]. Objects made so far are kept.
     pub(crate) fn environment(
         &mut self,
         heap: &mut Heap,

@@ -196,7 +196,7 @@ impl Unit {
     /// Returns the object for a datum.
     ///
     /// # Errors
-    /// As for every allocation. What was made is remembered, so a second attempt resumes.
+    /// As for every allocation. Objects made so far are remembered, so a second attempt resumes.
     pub(crate) fn value_of(
         &mut self,
         heap: &mut Heap,

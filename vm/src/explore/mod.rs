@@ -291,8 +291,8 @@ pub fn explore_while<C, T: PartialEq + Clone, E>(
 /// Calls functions in threads of their own and the last one in this thread, and waits for all of them.
 pub type SideBySide<'f> = dyn Fn(Vec<Box<dyn FnOnce() + Send + '_>>, &mut dyn FnMut()) + 'f;
 
-/// As [`explore_while`], in so many threads, which are made by `side_by_side`. What is found, and its order,
-/// is the same for any number. `goes_on` is asked now and then.
+/// As [`explore_while`], in so many threads, which are made by `side_by_side`. The findings and their order
+/// are the same for any number. `goes_on` is asked now and then.
 ///
 /// # Errors
 /// Those of `begin`.

@@ -2,8 +2,8 @@
 //! instruction.
 //!
 //! Values arrive in the value list. A call's go to its window. A substitute goes where the row of the failed
-//! instruction in the opcode table says, and control goes on behind the instruction. What computes the
-//! substitute runs in a frame above the failed instruction, whose pc is saved between the two:
+//! instruction in the opcode table says, and control goes on behind the instruction. The function that
+//! computes the substitute runs in a frame above the failed instruction, whose pc is saved between the two:
 //!
 //! ```text
 //! registers of the frame with the failed instruction | its pc | %raise | return pc, a stub | arguments ...

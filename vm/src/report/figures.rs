@@ -19,8 +19,7 @@ impl Vm {
         self.watch.passages.get_or_insert_default();
     }
 
-    /// Returns how often control has passed each place since the last call. What has no place here was not
-    /// passed.
+    /// Returns how often control has passed each place since the last call. Missing places were not passed.
     pub fn take_passages(&mut self) -> Vec<u64> {
         self.watch.passages.as_mut().map(std::mem::take).unwrap_or_default()
     }

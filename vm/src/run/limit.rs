@@ -75,7 +75,7 @@ pub(crate) fn stand_still(vm: &mut Vm, stops_clock: bool) {
     }
 }
 
-/// Has the running task go on after it has stood still. What has become pending meanwhile is delivered.
+/// Has the running task go on after it has stood still. Requests pending since then are delivered.
 pub(crate) fn go_on(vm: &mut Vm) {
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
     let index = vm.scheduler.turn.index;

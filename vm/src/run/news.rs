@@ -47,8 +47,8 @@ pub(super) fn say_what_operators_can_do(vm: &mut Vm) {
 /// Inputs that are named when a run waits for operators.
 const SAID: usize = 5;
 
-/// Takes in what is heard of an operation: notes it in the handle, and signals that. What is heard of one
-/// that is over has no effect.
+/// Takes in news of an operation: notes them in the handle, and signals it. News of an operation that is over
+/// have no effect.
 pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
     let Some(open) = vm.outside.operations.open.get(&number) else { return };
     let (handle, is_cancelled) = (open.handle, open.is_cancelled);

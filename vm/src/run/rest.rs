@@ -2,8 +2,8 @@
 //!
 //! A task that is suspended is interrupted, and a function of the library in it does what there is to do
 //! around a suspension, and waits for the end of it. Most tasks of a large tree only wait, and have nothing
-//! to do: for these it is enough that no wake-up reaches them. What comes meanwhile is noted, and they go on
-//! with it later.
+//! to do: for these it is enough that no wake-up reaches them. Wake-ups are noted meanwhile, and delivered
+//! later.
 
 use super::wake::make_runnable;
 use crate::report::{self, Happening};

@@ -49,7 +49,7 @@ impl Default for SpawnOptions {
 
 impl Vm {
     /// Makes a task that will call `function`, a function or a symbol that names one, and puts it at the end
-    /// of its queue. What became of it is kept until [`Vm::forget`].
+    /// of its queue. Its outcome is kept until [`Vm::forget`].
     ///
     /// # Errors
     /// [`Exit::Collect`] if there is no room for it.

@@ -1,7 +1,7 @@
 //! Portions of a run: the embedder may give a run its ticks in portions, which changes nothing in the run.
 //!
-//! So the end of a portion ends no turn. What is known of the slice that it falls into is kept, and the next
-//! portion begins with the rest of that slice. Until then nothing that a program can see has been counted.
+//! So the end of a portion ends no turn. The state of the slice that it falls into is kept, and the next
+//! portion begins with the rest of that slice. Until then no counter that a program can see has changed.
 
 use esl_heap::list_state;
 

@@ -1,9 +1,9 @@
 //! The dynamic bindings of a task.
 //!
 //! Deep binding: a variable's value is that of the newest binding of its symbol, and a switch of tasks costs
-//! nothing. The newest [`NEAR`] bindings are searched one by one. What lies below them is also found by a
-//! table, which follows with hysteresis, so that few and short-lived bindings never meet it: reading a
-//! variable costs the same below a million bindings of others as below a hundred.
+//! nothing. The newest [`NEAR`] bindings are searched one by one. Older ones are also found by a table, which
+//! follows with hysteresis, so that few and short-lived bindings never meet it: reading a variable costs the
+//! same below a million bindings of others as below a hundred.
 //!
 //! Invariant: `table.newest` has, for each symbol bound among the first `table.previous.len()` bindings, the
 //! index of the newest of these; `table.previous[i]` is what it had before binding `i`, plus one, or 0.

@@ -3,7 +3,7 @@
 //! Entries are pushed and popped by instructions; a throw, a handler that takes a condition, and an abort
 //! unwind them. Unwinding is a state of the task, not a Rust stack: entries are popped one by one, a tick
 //! each, a cleanup runs as ordinary code and goes on with the unwinding when it ends. So a cleanup can be
-//! preempted, and 10^6 entries unwind without holding anybody up.
+//! preempted, and 10^6 entries unwind without delaying other tasks.
 //!
 //! Invariant: an entry of a frame is popped before the frame is left (the verifier's V9), so every entry's
 //! `base` is that of a live frame.

@@ -50,8 +50,8 @@ pub(crate) enum TaskState {
 }
 
 /// Record of a task. There may be a million of them, so rarely used parts are behind pointers: [`Extra`] and
-/// [`LazyControl`]. What is looked at in all tasks of a tree comes first, since it then is in one line of the
-/// cache, or two.
+/// [`LazyControl`]. The fields that are read in all tasks of a tree come first, so that they share one line
+/// of the cache, or two.
 #[derive(Clone)]
 #[repr(C)]
 pub(crate) struct Task {
@@ -362,8 +362,8 @@ impl Task {
         if let Some(interrupted) = interrupted {
             return interrupted;
         }
-        // It followed a form that had returned. What made it end is for the whole task or for a form further
-        // out; with a cleanup around it that one is what ends.
+        // It followed a form that had returned. The reason for its end concerns the whole task or a form
+        // further out; if a cleanup is around it, that cleanup ends.
         if let Some(entry) = self.control.innermost_cleanup() {
             return Unwinding { target: UnwindTarget::Cleanup(entry), values: Vec::new() };
         }

@@ -127,8 +127,8 @@ pub(crate) fn has_senders_wait(heap: &Heap, input: Value) -> bool {
     is_full(heap, input) && when_full(heap, input) == WhenFull::Wait
 }
 
-/// Keeps a signal, the cons of the list of its arguments and `NIL`, as the newest. What there is no room for
-/// is dropped by the input's rule; one whose senders wait takes it nevertheless.
+/// Keeps a signal, the cons of the list of its arguments and `NIL`, as the newest. Without room a signal is
+/// dropped by the input's rule; an input whose senders wait takes it nevertheless.
 pub(crate) fn keep(heap: &mut Heap, input: Value, cell: Value) {
     if is_full(heap, input) {
         match when_full(heap, input) {

@@ -1,7 +1,7 @@
 //! Channels: streams that functions of the library read from and write to, as for sockets.
 //!
 //! A channel has the characters that were supplied and not read yet, and a string stream that gathers what is
-//! written. What cannot go on without the functions gives [`Exit::Slowly`]: the twin of the builtin has more
+//! written. A builtin that needs the functions returns [`Exit::Slowly`]: its twin has more
 //! supplied, or writes what was gathered, and calls the builtin again.
 
 use crate::builtins::COPY_LIMIT;

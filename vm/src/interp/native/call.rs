@@ -117,8 +117,8 @@ unsafe fn call_builtin(
     number: u16,
     place: FramePlace,
 ) -> Result<Value, u64> {
-    // SAFETY: V3: the window holds the arguments. What a builtin asks for is called as from the loop, which
-    // goes on in the frame that this makes.
+    // SAFETY: V3: the window holds the arguments. A call that a builtin requests is made as from the loop,
+    // which goes on in the frame that this makes.
     unsafe {
         if (*context).ticks <= 0 {
             return Err(CALL_AGAIN);

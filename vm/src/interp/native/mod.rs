@@ -326,7 +326,7 @@ unsafe fn note_wrong_guess(vm: &mut Vm, base: u64) {
     }
 }
 
-/// Gives machine code back in which a function was inlined that its symbol no longer has. What is made anew
+/// Releases machine code in which a function was inlined that its symbol no longer has. New machine code
 /// calls it.
 ///
 /// # Safety
@@ -346,7 +346,7 @@ unsafe fn note_redefined(vm: &mut Vm, context: &NativeContext) {
 }
 
 impl Vm {
-    /// Sets how functions run from now on. What was made stays. Machine code takes up to 512 KiB of the
+    /// Sets how functions run from now on. Existing machine code stays. It takes up to 512 KiB of the
     /// thread's stack.
     pub fn set_tier(&mut self, tier: Tier) {
         if cfg!(feature = "no-ticks") {

@@ -139,7 +139,7 @@ pub(crate) fn load(
 }
 
 /// The loading of a module, which goes on in parts. Between two of them its values are roots of the
-/// collector. What it cannot do for want of room it does when it goes on.
+/// collector. Steps without enough room are repeated when it goes on.
 pub(crate) struct ModuleLoad<M> {
     module: M,
     verification: Verification,
