@@ -78,7 +78,7 @@ thread_local! {
 /// A future that was begun.
 struct BegunFuture<F>(Mutex<FutureStage<F>>);
 
-/// What has become of such a future.
+/// The stage of such a future.
 enum FutureStage<F> {
     /// It is being polled. Meanwhile it was woken, and it was told to stop, or not.
     Runs { is_woken: bool, is_stopped: bool },
@@ -203,7 +203,7 @@ mod tests {
     use std::sync::mpsc::{Receiver, Sender, channel};
     use std::time::Duration;
 
-    /// What stops a future.
+    /// Stops a future.
     type Stop = Box<dyn FnOnce() + Send>;
 
     /// Says that it is dropped.
@@ -211,7 +211,7 @@ mod tests {
 
     impl Drop for Said {
         fn drop(&mut self) {
-            // Nobody listens after a failure.
+            // The receiver is gone after a failure.
             drop(self.0.send("dropped".into()));
         }
     }
@@ -287,7 +287,7 @@ mod tests {
         // Later ones have no effect.
         waker.wake();
         assert_eq!((heard(&said).as_deref(), heard(&said).as_deref()), (Some("other"), Some("dropped")));
-        // What wakes itself goes on at once, unless that does not end.
+        // A future that wakes itself goes on at once, unless it does so for ever.
         let here = std::thread::current().name().unwrap_or_default().to_owned();
         let said = begun(Waker::wake_by_ref);
         assert_eq!((heard(&said), heard(&said).as_deref()), (Some(here), Some("dropped")));

@@ -15,7 +15,7 @@ use tokio::time::Sleep;
 /// Time for which a client waits for its answer that has closed its direction of the connection, before it
 /// counts as gone: the system does not say whether it still reads.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Time between two looks at a connection over which bytes have come that nobody reads yet.
+/// Time between two checks of a connection with bytes that are not read yet.
 const PAUSE: Duration = Duration::from_millis(250);
 /// Time in which what a client still sends is taken after the last answer. A connection that is closed before
 /// is reset, and the client may not get the answer.

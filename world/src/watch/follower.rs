@@ -14,7 +14,7 @@ use notify::{Event, EventKind, RecommendedWatcher, RecursiveMode, Watcher};
 /// A change of the path or of an entry of it, and its path.
 pub(super) type PathChange = (&'static str, PathBuf);
 
-/// What a path stands for at a moment: another one stands for another file.
+/// The identity of the file that a path denotes at a moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Identity(u64, u64);
 
@@ -37,7 +37,7 @@ pub(super) struct Follower {
     /// The current folder, in which all folders on the way to the path are watched.
     base: Option<PathBuf>,
     watched: BTreeSet<PathBuf>,
-    /// What the path stands for, as far as the program was told.
+    /// The identity of the path's file, as far as the program was told.
     known: Option<Identity>,
 }
 
@@ -108,7 +108,7 @@ impl Follower {
             }
             self.known = None;
         }
-        // What is made while the watches are set up is seen the next time.
+        // Files that are made while the watches are set up are seen in the next round.
         let mut now = self.rearrange();
         for _ in 0..MOST_ROUNDS {
             let next = self.rearrange();
