@@ -8,7 +8,7 @@
 //! Therefore:
 //!
 //! * code that reads the opcode of a word in loaded code gets that of the first part, by [`original`];
-//! * a part that cannot be done in the fast way is done as the instruction that it is: a fused instruction
+//! * a part that the fast path cannot do is executed as the instruction that it is: a fused instruction
 //!   that has done some of its parts goes on at the word of the next one;
 //! * a jump may lead behind the first part.
 //!

@@ -10,8 +10,8 @@
 //!
 //! A constant operand of `make-closure` is, for a function without captures, its Function; for one with
 //! captures, its Code, ready to run. `Code::arity` is the exact number of arguments of bytecode that takes
-//! just required ones, and [`Code::ANY_ARITY`] for everything else, so that only the slow way of a call looks
-//! at the shape.
+//! just required ones, and [`Code::ANY_ARITY`] for everything else, so that only the slow path of a call
+//! looks at the shape.
 //!
 //! [`Code::ANY_ARITY`]: crate::heap::layout::Code::ANY_ARITY
 

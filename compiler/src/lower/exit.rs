@@ -41,7 +41,7 @@ impl FunctionBuilder<'_, '_> {
         self.finish(inner, dest);
     }
 
-    /// Lowers a body inside a catch for the tag in a register. Both ways out meet at `end`.
+    /// Lowers a body inside a catch for the tag in a register. Both exits meet at `end`.
     fn guarded(&mut self, tag: Reg, end: SegmentLabel, inner: Dest, body: NodeId) {
         let depth = self.extents.len();
         let (window, want) = (self.registers.top(), inner.want());

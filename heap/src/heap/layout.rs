@@ -262,7 +262,7 @@ pub struct CodeObject {
     pub owner: Value,
     /// Address at which execution begins; normally that of the first word.
     pub entry: *const u32,
-    /// Exact number of arguments, or [`CodeObject::ANY_ARITY`] if a call has to go the slow way.
+    /// Exact number of arguments, or [`CodeObject::ANY_ARITY`] if a call has to take the slow path.
     pub arity: u32,
     /// Number of registers of a frame.
     pub nregs: u32,

@@ -33,7 +33,7 @@ pub(super) struct StateTasks {
 pub(super) struct StepCause {
     /// Rank of the task that went on, [`TIME`], or [`NO_TASK`] if that is not known.
     pub(super) ran: u8,
-    /// The way that the program chose.
+    /// The alternative that the program chose.
     pub(super) way: u16,
     /// Whether the same tasks were there afterwards.
     pub(super) keeps_tasks: bool,
@@ -283,7 +283,7 @@ mod tests {
 
     #[test]
     fn a_way_round_is_fair_to_those_who_could_go_on_all_along() {
-        // Two tasks turn by turn, beside a way out.
+        // Two tasks turn by turn, beside an exit.
         let tasks = [state(0b11), state(0b11), state(0b11)];
         let both = [step(0, 1, 0), step(1, 0, 1), step(1, 2, 0)];
         assert_eq!(lap(&tasks, &both), Some(FairLap { state: 0, choices: vec![0, 1] }));

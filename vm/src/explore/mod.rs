@@ -20,7 +20,7 @@
 //! task, or queries the database; with [`Grain::Variables`] also at a tick after it has used a special
 //! variable of the program, and with [`Grain::Ticks`] at every tick. Nothing between two points is visible to
 //! other tasks by these means, so every schedule of the machine behaves like one of those explored. Places
-//! that tasks share in other ways (slots, elements, pairs, tables, variables that closures share) are seen
+//! that tasks share otherwise (slots, elements, pairs, tables, variables that closures share) are seen
 //! only with [`Grain::Ticks`], unless all uses of them are in critical sections, which are one step each. A
 //! caller that calls a search complete has to know that the program has none. Where a program itself chooses,
 //! by `choose`, each way is tried. A task that reaches no point is stopped after [`Settings::turn`] ticks.
@@ -144,7 +144,7 @@ impl Default for Settings {
     }
 }
 
-/// A way in which runs end.
+/// An outcome of runs.
 #[derive(Clone, Debug)]
 pub struct ExploredEnding<T> {
     /// The caller's description.
@@ -176,13 +176,13 @@ pub struct Exploration<T> {
     pub limit: Option<SearchLimit>,
 }
 
-/// A schedule that returns to a state on a way that is fair: each task that could go on all the way has gone
+/// A schedule that returns to a state on a fair path: each task that could go on all along has gone
 /// on, and time has passed if it could.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Livelock {
     /// Choices that lead to the state, and from there back to it.
     pub choices: Vec<u32>,
-    /// Number of the first choice on the way back.
+    /// Number of the first choice on the path back.
     pub lap: usize,
 }
 

@@ -14,7 +14,7 @@ use crate::vm::Vm;
 pub(super) struct Runnable<'a> {
     /// The tasks that can run; with ways, the one that asks comes first.
     pub(super) tasks: &'a [TaskIndex],
-    /// Number of ways in which the first task may go on, if it is the one that asks, by `choose`.
+    /// Number of alternatives of the first task, if it is the one that asks, by `choose`.
     pub(super) ways: Option<u32>,
     /// Whether the first of the tasks is the one that ran last.
     pub(super) has_last: bool,

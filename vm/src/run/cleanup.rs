@@ -40,7 +40,7 @@ pub(super) fn cut_off_cleanup(vm: &mut Vm) -> bool {
     scheduler.cancel_wait(&mut vm.heap);
     let control = &mut scheduler.task_mut().control;
     let entry = control.running[position].entry;
-    // It is left once; what runs on the way out has allowances of its own.
+    // It is left once; cleanups on the exit path have allowances of their own.
     control.set_allowance(position, Allowance::OVER);
     let is_under_way = control
         .unwinding

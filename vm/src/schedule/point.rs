@@ -69,7 +69,7 @@ pub(crate) struct Points {
     pub(crate) has_shown: bool,
     /// Number of ways among which the task that ran last wants one to be chosen.
     pub(crate) asked: Option<usize>,
-    /// The way that was chosen for it.
+    /// The alternative that was chosen for it.
     pub(crate) chosen: Option<usize>,
     /// The uses of special variables, oldest first; `None` unless a schedule is told.
     pub(crate) uses: Option<Vec<VariableUse>>,

@@ -57,7 +57,7 @@ impl Environment {
     }
 }
 
-/// A way out other than giving values.
+/// An exit other than returning values.
 enum Exit {
     Unwind { target: u64, values: Vec<Value> },
     Fail(Symbol),
