@@ -2,9 +2,8 @@
 //! changes.
 //!
 //! This crate puts the compiler, the virtual machine and the library together. [`Engine`] evaluates ESL for
-//! programs in Rust; [`program`] compiles and runs whole programs, as the commands `eslc` and `eslvm` do. The
-//! package is called `esl-lang`. Its feature `cli`, on by default, adds the commands, the REPL and what only
-//! they depend on.
+//! programs in Rust; [`program`] compiles and runs whole programs, as the commands `eslc` and `eslvm` do (the
+//! package `esl-commands`). The package is called `esl-lang`.
 //!
 //! ```
 //! use esl::Engine;
@@ -26,29 +25,12 @@
 #[doc = include_str!("../docs/manual/embedding.md")]
 struct Embedding;
 
-pub mod command;
-pub mod coverage;
 pub mod data;
 pub mod engine;
 pub mod error;
-pub mod explore;
-pub mod format;
-#[cfg(feature = "cli")]
-pub mod lsp;
 pub mod module_path;
-#[cfg(feature = "cli")]
-pub mod new;
-#[cfg(feature = "cli")]
-pub mod operate;
-#[cfg(feature = "cli")]
-pub mod profile;
 pub mod program;
-#[cfg(feature = "cli")]
-pub mod repl;
-pub mod replay;
-pub mod syntax;
-pub mod testing;
-pub mod timeline;
+pub mod size;
 
 pub use data::Data;
 pub use engine::Engine;

@@ -13,6 +13,7 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::compile::Required;
@@ -164,10 +165,15 @@ impl ModulePath {
         }
         Err(ModuleError::NotFound { name: name.into(), folders: self.folders.clone() })
     }
-}
 
-#[cfg(feature = "cli")]
-impl ModulePath {
+    /// Returns the text of the module of this name, if [`find`](Self::find) finds its source.
+    pub fn source_of(&self, name: &str) -> Option<Arc<str>> {
+        match self.find(name) {
+            Ok(Required::Source { text, .. }) => Some(text),
+            _ => None,
+        }
+    }
+
     /// Returns the names of the modules that are there, sorted: of those in the folders themselves, and of
     /// those that come with the machine.
     pub fn names(&self) -> Vec<String> {

@@ -22,6 +22,26 @@ const SECTIONS: [(&str, &str); 10] = [
     ("### The other folders", "conformance/src"),
 ];
 
+/// Folders of the packages that the table of tools lists as a whole.
+const TOOLS: [&str; 10] = [
+    "commands/eslc",
+    "commands/eslvm",
+    "commands/shared",
+    "format",
+    "language-server",
+    "operate",
+    "replay",
+    "syntax",
+    "testing",
+    "timeline",
+];
+
+/// Returns the folders of the sources of all packages in the code map.
+fn packages() -> impl Iterator<Item = PathBuf> {
+    let tools = TOOLS.iter().map(|tool| root().join(tool).join("src"));
+    SECTIONS.iter().map(|(_, folder)| root().join(folder)).chain(tools)
+}
+
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -56,6 +76,13 @@ fn the_map_lists_every_module() {
     let document = read("ARCHITECTURE.md");
     for (heading, folder) in SECTIONS {
         assert_eq!(names_of_rows(section(&document, heading)), modules(&root().join(folder)), "{heading}");
+    }
+    let tools: BTreeSet<String> = TOOLS.iter().map(|tool| format!("{tool}/")).collect();
+    assert_eq!(names_of_rows(section(&document, "### The tools")), tools);
+    let members = read("Cargo.toml");
+    let members = members.split("members = [").nth(1).and_then(|rest| rest.split(']').next());
+    for member in members.expect("there are members").split('"').skip(1).step_by(2) {
+        assert!(document.contains(&format!("`{member}/`")), "`{member}/` is not in the map");
     }
 }
 
@@ -174,9 +201,8 @@ const COLUMNS: usize = 110;
 #[test]
 fn comments_are_as_narrow_as_code() {
     let mut wide = Vec::new();
-    for (_, folder) in SECTIONS {
-        let package = root().join(folder.trim_end_matches("src"));
-        let parts = ["src", "tests"].map(|part| package.join(part));
+    for folder in packages() {
+        let parts = [folder.clone(), folder.with_file_name("tests")];
         for path in parts.into_iter().filter(|part| part.is_dir()).flat_map(sources) {
             let text = fs::read_to_string(&path).expect("a source can be read");
             for (number, line) in text.lines().enumerate() {
@@ -327,10 +353,10 @@ fn error_types(text: &str) -> Vec<&str> {
 
 #[test]
 fn errors_have_types() {
-    let folders =
-        SECTIONS.iter().map(|(_, folder)| *folder).chain(["stdlib", "playground", "benches", "fuzz"]);
+    let others = ["stdlib", "playground", "benches", "fuzz"].map(|folder| root().join(folder));
+    let folders = packages().chain(others);
     let mut found = BTreeSet::new();
-    for path in folders.flat_map(|folder| product_sources(root().join(folder))) {
+    for path in folders.flat_map(product_sources) {
         let text = fs::read_to_string(&path).expect("a source can be read");
         let product = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
         let types = error_types(product);
@@ -351,8 +377,8 @@ fn errors_have_types() {
 #[test]
 fn each_type_name_means_one_thing() {
     let mut declared: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
-    for (_, folder) in SECTIONS {
-        for path in product_sources(root().join(folder)) {
+    for folder in packages() {
+        for path in product_sources(folder) {
             let text = fs::read_to_string(&path).expect("a source can be read");
             let product = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
             let names: BTreeSet<&str> = product.lines().filter_map(declared_type).collect();
@@ -383,8 +409,7 @@ fn the_compiler_and_the_machine_ask_a_host_for_all_that_a_browser_lacks() {
 #[test]
 fn each_type_in_the_glossary_exists() {
     let glossary = read("docs/glossary.md");
-    let types: BTreeSet<String> =
-        SECTIONS.iter().flat_map(|(_, folder)| declared_types(root().join(folder))).collect();
+    let types: BTreeSet<String> = packages().flat_map(declared_types).collect();
     let named = names_of_rows(&glossary);
     let is_type = |name: &str| name.starts_with(|c: char| c.is_ascii_uppercase());
     let named: Vec<&str> = named.iter().filter_map(|name| name.split("::").last()).collect();

@@ -7,17 +7,27 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Folders of documents; `docs` and `examples` with all that is below them.
-const FOLDERS: [&str; 12] = [
+const FOLDERS: [&str; 22] = [
     "",
     "benches",
     "bytecode",
+    "commands/eslc",
+    "commands/eslvm",
+    "commands/shared",
     "compiler",
     "conformance",
     "docs",
     "examples",
+    "format",
     "fuzz",
     "heap",
+    "language-server",
+    "operate",
+    "replay",
     "stdlib",
+    "syntax",
+    "testing",
+    "timeline",
     "vm",
     "world",
 ];
@@ -35,7 +45,9 @@ fn collect(folder: &Path, is_deep: bool, found: &mut BTreeMap<PathBuf, String>) 
             if is_deep {
                 collect(&path, true, found);
             }
-        } else if path.extension().is_some_and(|extension| extension == "md") {
+        } else if path.extension().is_some_and(|extension| extension == "md")
+            && !root().join(&path).is_symlink()
+        {
             let text = fs::read_to_string(root().join(&path)).expect("the document can be read");
             found.insert(path, text);
         }

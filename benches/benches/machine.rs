@@ -5,11 +5,11 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use esl::explore::{Grain, Settings, explore};
 use esl::host::VirtualHost;
 use esl::program::{self, Program, Source};
 use esl::{Config, Engine};
 use esl_bytecode::datum::Datum;
+use esl_testing::explore::{Grain, Settings, explore};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::vm::Vm;

@@ -5,7 +5,7 @@
 //! a line of the source. The expansion of a macro has the place of the macro's call and is not counted apart.
 //!
 //! Guarantees: the meaning of the form stays, and its ticks. Not here: which places are the clauses of the
-//! forms that people know (the package `esl-lang`).
+//! forms that people know (the package `esl-testing`).
 
 use esl_bytecode::span::Span;
 

@@ -10,7 +10,6 @@ use std::time::{Duration, Instant};
 use esl::Config;
 use esl::host::{Rights, VirtualHost};
 use esl::program;
-use esl::replay::{self, Recorded, Rerun};
 use esl_bytecode::compile::{Compile, drive};
 use esl_bytecode::module::Module;
 use esl_bytecode::span::SourceId;
@@ -18,6 +17,7 @@ use esl_bytecode::symbol::USER_PACKAGE;
 use esl_bytecode::{file, verify};
 use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_compiler::session::Compiler;
+use esl_replay::{self as replay, Recorded, Rerun};
 #[cfg(feature = "native")]
 use esl_vm::vm::Tier;
 use esl_vm::vm::Vm;

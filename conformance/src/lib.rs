@@ -5,11 +5,22 @@ pub mod anything;
 pub mod chapter;
 pub mod differential;
 pub mod fault;
+pub mod folder;
 pub mod process;
 pub mod programs;
 pub mod transcript;
 
+use std::path::Path;
+
 use fault::{LineFault, WrongLine};
+
+/// Returns the root of the workspace.
+///
+/// # Panics
+/// Never: this package is a folder of the workspace.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the package is a folder of the workspace")
+}
 
 /// A setting under which a program runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

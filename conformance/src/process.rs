@@ -5,6 +5,7 @@
 
 use std::fmt;
 use std::io::{Read, Write};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -43,6 +44,26 @@ impl Finished {
     pub fn quiet_output(self) -> Result<String, NotQuiet> {
         if self.errors.is_empty() { Ok(self.output) } else { Err(NotQuiet(self.errors)) }
     }
+}
+
+/// Returns the path of another command that is built beside the one at `path`. Tests of a package know the
+/// path of its own commands only.
+///
+/// # Panics
+/// If the command is not there: tests of one package do not build those of another.
+pub fn beside(path: &str, name: &str) -> String {
+    let beside = Path::new(path).with_file_name(name).with_extension(std::env::consts::EXE_EXTENSION);
+    let beside = beside.display().to_string();
+    assert!(Path::new(&beside).exists(), "{beside} is not there: type `cargo build --bin {name}` first");
+    beside
+}
+
+/// Returns the command at a path with these arguments, without the folders of modules that the environment
+/// names.
+pub fn command(path: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(path);
+    command.args(arguments).env_remove("ESL_LIBRARY");
+    command
 }
 
 /// Starts a command whose three standard streams are pipes.

@@ -10,8 +10,8 @@ use std::time::Duration;
 use esl::Config;
 use esl::host::{Incoming, ProcessSignal, RealHost, RecordingHost, ReplayHost, Rights};
 use esl::program::{self, Program, Source, compile};
-use esl::replay::{Recorded, Replayed, Rerun, RunSetup, record};
 use esl_conformance::{Expectations, programs};
+use esl_replay::{Recorded, Replayed, Rerun, RunSetup, record};
 use esl_vm::run::RunOutcome;
 use esl_vm::vm::Vm;
 

@@ -8,9 +8,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use esl::Config;
-use esl::command::{exit_status, parse_size, parse_stack};
 use esl::host::VirtualHost;
 use esl::program::{self, Compiled, Program, Source};
+use esl::size::{parse_size, parse_stack};
 use esl_bytecode::diagnostic::Severity;
 use esl_conformance::{Expectations, Setting, programs};
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -152,7 +152,7 @@ fn run(name: &str, expected: &Expectations, program: &Program, config: Config) -
             &lines[first..],
         ));
     }
-    let status = exit_status(summary.ended);
+    let status = summary.ended.exit_status();
     if status != expected.expected_status() {
         return Err(format!(
             "ended with status {status} ({:?}), expected {}\nstandard error:\n{errors}",

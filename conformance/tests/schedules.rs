@@ -43,7 +43,7 @@ fn run(program: &Program, choices: Choices, slice: u32) -> Run {
     let lines = output.lines().map(str::trim_end).filter(|line| !line.is_empty()).map(String::from);
     Run {
         lines: lines.collect(),
-        status: esl::command::exit_status(report.ended),
+        status: report.ended.exit_status(),
         choices: machine.choices().made().to_vec(),
         errors: captured.error(),
         ticks: report.ticks,

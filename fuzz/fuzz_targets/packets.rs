@@ -3,12 +3,12 @@
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    esl::operate::noise::understand(bytes);
+    esl_operate::noise::understand(bytes);
     // A fuzzer seldom finds lengths: here lines become packets.
     let mut framed = Vec::new();
     for line in bytes.split(|&byte| byte == b'\n') {
         framed.extend_from_slice(format!("{:06x}", line.len()).as_bytes());
         framed.extend_from_slice(line);
     }
-    esl::operate::noise::understand(&framed);
+    esl_operate::noise::understand(&framed);
 });

@@ -14,12 +14,12 @@ pub mod abi;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use esl::Config;
-use esl::format::{self, Styles};
 use esl::host::{Captured, Incoming, Output, ProcessSignal, VirtualHost};
 use esl::program::{self, Compiled, Ended, Program, Source, Summary};
-use esl::syntax::SyntaxTree;
-use esl::timeline::Drawing;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_format::{self as format, Styles};
+use esl_syntax::SyntaxTree;
+use esl_timeline::Drawing;
 use esl_vm::observe::{Observer, Seen};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::{TaskId, TaskNumber};

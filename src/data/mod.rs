@@ -136,7 +136,8 @@ impl Data {
         Datum::new(kind, span)
     }
 
-    pub(crate) fn from_datum(datum: &Datum) -> Data {
+    /// Returns a datum of the machine as Rust sees it.
+    pub fn from_datum(datum: &Datum) -> Data {
         match datum.kind() {
             DatumKind::Nil => Data::Nil,
             DatumKind::Symbol(symbol) if symbol.is_cl("T") => Data::True,

@@ -20,6 +20,7 @@
 mod compile;
 mod identity;
 mod run;
+mod schedule;
 
 use std::sync::Arc;
 
@@ -32,12 +33,13 @@ use esl_vm::load::LoadError;
 pub use compile::{
     Compiled, Modules, compile, compile_covered, compile_for_run, compile_on, compile_with, expand,
 };
+pub use esl_vm::explore::Settings;
 pub use identity::{EXECUTION_EPOCH, ExecutionIdentity};
-pub(crate) use run::end;
 pub use run::{
-    Ended, Summary, begin, finish, machine, run, run_by, run_in, run_in_portions, set_module_path, set_traces,
+    Ended, Summary, begin, begin_with, end, end_rest, finish, load, machine, run, run_by, run_in,
+    run_in_portions, set_module_folders, set_module_path, set_program_file, set_traces,
 };
-pub(crate) use run::{begin_with, end_rest, load, set_module_folders, set_program_file};
+pub use schedule::{Schedule, ScheduleError};
 
 /// A source text and its name in diagnostics and backtraces.
 #[derive(Clone, Debug)]
@@ -86,7 +88,7 @@ impl Program {
     }
 
     /// Returns the compiled unit.
-    pub(crate) fn module(&self) -> &Module {
+    pub fn module(&self) -> &Module {
         &self.module
     }
 

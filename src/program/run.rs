@@ -4,7 +4,8 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::session::Compiler;
-use esl_host::{Host, ProcessSignal};
+use esl_host::{Host, HostOperation, ProcessSignal};
+use esl_vm::embed::HostFunction;
 use esl_vm::explore::Settings;
 use esl_vm::heap::HeapStats;
 use esl_vm::run::RunOutcome;
@@ -31,6 +32,38 @@ pub enum Ended {
     Deadlocked,
     /// A signal of the process has ended the run.
     Signalled(ProcessSignal),
+}
+
+impl Ended {
+    /// Status of a run that came to its end.
+    pub const SUCCESS: u8 = 0;
+    /// Status of a run whose main task a failure left.
+    pub const FAILED: u8 = 1;
+    /// Status of a run in which no task can ever run again.
+    pub const DEADLOCKED: u8 = 4;
+    /// Status of a run that has spent its budget, or needs more memory than it may have.
+    pub const BUDGET_OR_MEMORY_SPENT: u8 = 5;
+    /// Status of a run that a signal has ended, less the number of the signal, as shells report it.
+    pub const SIGNALLED: u8 = 128;
+
+    /// Returns the exit status of a command whose run has ended so.
+    ///
+    /// ```
+    /// use esl::host::ProcessSignal;
+    /// use esl::program::Ended;
+    ///
+    /// assert_eq!(Ended::Normally(7).exit_status(), 7);
+    /// assert_eq!(Ended::Signalled(ProcessSignal::Terminate).exit_status(), 143);
+    /// ```
+    pub fn exit_status(self) -> u8 {
+        match self {
+            Ended::Normally(status) => status,
+            Ended::Failed => Ended::FAILED,
+            Ended::Deadlocked => Ended::DEADLOCKED,
+            Ended::BudgetSpent | Ended::HeapExhausted => Ended::BUDGET_OR_MEMORY_SPENT,
+            Ended::Signalled(signal) => Ended::SIGNALLED + signal.number(),
+        }
+    }
 }
 
 /// Figures of a run.
@@ -65,10 +98,17 @@ pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, Error> 
     esl_stdlib::load(&mut machine).map_err(|_| Error::NoMemory("the library"))?;
     #[cfg(feature = "world")]
     esl_world::install_modules(&mut machine);
-    #[cfg(feature = "cli")]
-    crate::operate::attach::install_nobody(&mut machine);
+    install_nobody(&mut machine);
     machine.begin_program(config);
     Ok(machine)
+}
+
+/// Gives a machine that nobody attends the functions by which the library tells operators something.
+fn install_nobody(machine: &mut Vm) {
+    let ignore = |_: &[Datum]| Ok(Datum::nil(Default::default()));
+    machine.add_host_function("%TELL-OPERATOR", HostFunction::AtOnce(Box::new(ignore)));
+    let ignore = |operation: HostOperation| operation.complete(Vec::new());
+    machine.add_host_function("%WRITE-OPERATOR", HostFunction::Operation(Box::new(ignore)));
 }
 
 /// Has a machine write to its error output what happens to `failures`, `goals` or `tasks`. Nothing changes if
@@ -101,7 +141,7 @@ pub fn set_module_path(machine: &mut Vm, path: &ModulePath) -> Result<(), Error>
 ///
 /// # Errors
 /// [`Error::NoMemory`].
-pub(crate) fn set_program_file(machine: &mut Vm, names: &[String]) -> Result<(), Error> {
+pub fn set_program_file(machine: &mut Vm, names: &[String]) -> Result<(), Error> {
     if names.is_empty() {
         return Ok(());
     }
@@ -116,7 +156,7 @@ pub(crate) fn set_program_file(machine: &mut Vm, names: &[String]) -> Result<(),
 ///
 /// # Errors
 /// [`Error::NoMemory`].
-pub(crate) fn set_module_folders(machine: &mut Vm, folders: &[String]) -> Result<(), Error> {
+pub fn set_module_folders(machine: &mut Vm, folders: &[String]) -> Result<(), Error> {
     let folders = folders.iter().map(|folder| Datum::string(folder, Span::default()));
     call_with_list(machine, "%SET-MODULE-PATH", folders)
 }
@@ -160,7 +200,7 @@ pub fn begin(machine: &mut Vm, program: &Program) -> Result<TaskId, Error> {
 ///
 /// # Errors
 /// As [`run`].
-pub(crate) fn load(machine: &mut Vm, program: &Program) -> Result<Value, Error> {
+pub fn load(machine: &mut Vm, program: &Program) -> Result<Value, Error> {
     Ok(machine.load_module(&program.module)?)
 }
 
@@ -169,7 +209,7 @@ pub(crate) fn load(machine: &mut Vm, program: &Program) -> Result<Value, Error> 
 ///
 /// # Errors
 /// As [`run`].
-pub(crate) fn begin_with(
+pub fn begin_with(
     machine: &mut Vm,
     program: &Program,
     function: &str,
@@ -253,7 +293,7 @@ pub fn finish(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Summary {
 }
 
 /// Aborts the tasks that are left at the end of a run, runs their cleanups, and says what does not end.
-pub(crate) fn end_rest(machine: &mut Vm) {
+pub fn end_rest(machine: &mut Vm) {
     let left = machine.end_run();
     machine.flush();
     if !left.is_empty() {
@@ -263,7 +303,7 @@ pub(crate) fn end_rest(machine: &mut Vm) {
 }
 
 /// Returns how a program with this main task has ended, and writes the reports of its failure or deadlock.
-pub(crate) fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended {
+pub fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended {
     machine.flush();
     if let Some(report) = machine.report(main) {
         machine.complain(&report);
@@ -294,7 +334,6 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use esl_host::{Inbox, Look, Survey, SurveyRequest, VirtualHost};
-    use esl_vm::embed::HostFunction;
     use esl_vm::observe::{Observer, Seen};
     use esl_vm::task::TaskNumber;
 

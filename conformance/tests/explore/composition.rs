@@ -1,7 +1,7 @@
 //! Tasks that belong to a form, under all schedules: with an abort, a failure or a suspension at every point,
 //! each body that has begun is cleaned up once, and no task, claim or count is left.
 
-use esl::explore::Grain;
+use esl_testing::explore::Grain;
 
 use crate::check;
 

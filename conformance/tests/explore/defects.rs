@@ -2,8 +2,8 @@
 //! exploration. For each, a program that would reveal it runs under all schedules, without the defect. Then
 //! the test puts the defect back into the library, and the exploration must reveal it.
 
-use esl::explore::{Grain, Settings, explore_with};
 use esl::program::Ended;
+use esl_testing::explore::{Grain, Settings, explore_with};
 use esl_vm::vm::Vm;
 
 use crate::putting_back::{TextChange, changed_functions};
@@ -38,7 +38,7 @@ fn check_that_it_shows(text: &str, expected: &[&str], changes: &[TextChange]) {
     let settings = Settings { grain: Grain::Changes, states: 50_000, ..Settings::default() };
     let prepare = |machine: &mut Vm| defect.put_into(machine);
     let found = explore_with(&compile(text), &settings, &prepare).expect("the program can start");
-    let is_well = |ending: &esl::explore::ExploredEnding<esl::explore::Behaviour>| {
+    let is_well = |ending: &esl_testing::explore::ExploredEnding<esl_testing::explore::Behaviour>| {
         let output = ending.what.output.split_whitespace().collect::<Vec<_>>().join(" ");
         ending.what.ended == Ended::Normally(0) && expected.contains(&&*output)
     };

@@ -1,6 +1,6 @@
 //! Fluents under all schedules: a waiting task sees every change that matters, whatever comes in between.
 
-use esl::explore::Grain;
+use esl_testing::explore::Grain;
 
 use crate::check;
 

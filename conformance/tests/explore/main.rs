@@ -11,9 +11,11 @@ mod suspension;
 mod variables;
 
 use esl::Config;
-use esl::explore::{Behaviour, Exploration, Grain, Livelock, Settings, explore, explore_together, follow};
 use esl::host::VirtualHost;
 use esl::program::{self, Ended, Program, Source};
+use esl_testing::explore::{
+    Behaviour, Exploration, Grain, Livelock, Settings, explore, explore_together, follow,
+};
 
 pub(crate) fn compile(text: &str) -> Program {
     let compiled = program::compile(&[Source::new("explored.esl", text)]);

@@ -1,7 +1,7 @@
 //! Resources under all schedules: nothing is held by a task that has ended, and no grant is lost, with an
 //! abort or a preemption at every point.
 
-use esl::explore::Grain;
+use esl_testing::explore::Grain;
 
 use crate::check;
 

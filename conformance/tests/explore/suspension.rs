@@ -1,7 +1,7 @@
 //! Suspension under all schedules: a task that is suspended and resumed ends as without, an abort reaches it
 //! wherever it is, and nothing is left.
 
-use esl::explore::Grain;
+use esl_testing::explore::Grain;
 
 use crate::check;
 

@@ -1,6 +1,6 @@
 //! Switches at uses of special variables, which `Grain::Variables` adds: those that matter, and no others.
 
-use esl::explore::Grain;
+use esl_testing::explore::Grain;
 
 use crate::{check, endings, outputs};
 

@@ -1,0 +1,126 @@
+//! `eslc check`: warnings that are denied or allowed, folders; and what to type in place of a wrong
+//! subcommand.
+
+use esl_conformance::folder::Folder;
+use esl_conformance::process;
+
+use crate::{eslc, eslvm};
+
+/// Runs `eslc` in a folder, and returns its status and what it writes to standard error.
+fn run(folder: &Folder, arguments: &[&str]) -> (Option<i32>, String) {
+    let finished = process::run(eslc(arguments).current_dir(folder.path()), "");
+    (finished.status, finished.errors)
+}
+
+const UNUSED: &str = "(defun drive (metres speed)\n  metres)\n";
+
+#[test]
+fn warnings_are_denied_and_allowed() {
+    let folder =
+        Folder::with("checking-warnings", &[("drive.esl", UNUSED), ("call.esl", "(no-such-function)")]);
+    let (status, errors) = run(&folder, &["check", "drive.esl"]);
+    assert_eq!(status, Some(0), "{errors}");
+    assert!(errors.contains("warning[unused-variable]"), "{errors}");
+    for (options, status, said) in [
+        (&["--deny", "warnings"][..], 3, "error[unused-variable]"),
+        (&["--deny", "unused-variable"], 3, "error[unused-variable]"),
+        (&["--deny", "undefined-function"], 0, "warning[unused-variable]"),
+        (&["--deny", "warnings", "--allow", "unused-variable"], 0, ""),
+        (&["--allow", "unused-variable"], 0, ""),
+        (&["--allow", "warnings"], 0, ""),
+        (&["--deny", "unused-variabel"], 2, "did you mean `unused-variable`?"),
+        (&["--allow", "unclosed-list"], 2, "the code of an error"),
+        (&["--deny", "unused-variable", "--allow", "unused-variable"], 2, "both denied and allowed"),
+    ] {
+        let (found, errors) = run(&folder, &[&["check"], options, &["drive.esl"]].concat());
+        assert_eq!(found, Some(status), "{options:?}: {errors}");
+        assert!(errors.contains(said) && said.is_empty() == errors.is_empty(), "{options:?}: {errors}");
+    }
+    // A program with denied warnings is not written.
+    let (status, errors) = run(&folder, &["compile", "--deny", "warnings", "call.esl"]);
+    assert_eq!(status, Some(3), "{errors}");
+    assert!(!folder.path().join("call.eslb").exists());
+}
+
+#[test]
+fn a_form_allows_warnings_in_its_place() {
+    let folder = Folder::new("checking-allowed");
+    let check = |text: &str| {
+        folder.file("drive.esl", text);
+        run(&folder, &["check", "--deny", "warnings", "drive.esl"])
+    };
+    let (status, errors) = check(&format!("(with-allowed-warnings (unused-variable) {UNUSED})\n(drive 1 2)"));
+    assert_eq!((status, &*errors), (Some(0), ""));
+    // A warning of the end of the compilation, in a function, beside one that is not allowed.
+    let (status, errors) = check(
+        "(defun one () (with-allowed-warnings (undefined-function) (open-the-door)))
+         (defun two () (close-the-door))",
+    );
+    assert_eq!(status, Some(3), "{errors}");
+    assert!(errors.contains("`close-the-door`") && !errors.contains("`open-the-door`"), "{errors}");
+    // Of a warning about several places, those count at which it is not allowed.
+    let (status, errors) = check(
+        "(with-allowed-warnings (undefined-function) (open-the-door))\n(open-the-door)\n\
+         (with-allowed-warnings (undefined-function) (open-the-door))",
+    );
+    assert_eq!(status, Some(3), "{errors}");
+    assert!(errors.contains("drive.esl:2:2") && !errors.contains("and here"), "{errors}");
+    for (codes, said) in [
+        ("(no-such-warning)", "knows no warning `no-such-warning`"),
+        ("(unclosed-list)", "cannot allow `unclosed-list`, which is an error"),
+        ("(3)", "needs codes of warnings, not `3`"),
+        ("unused-variable", "needs a list of codes before the forms"),
+    ] {
+        let (status, errors) = check(&format!("(with-allowed-warnings {codes} 1)"));
+        assert_eq!(status, Some(3), "{errors}");
+        assert!(errors.contains(said), "{codes}: {errors}");
+    }
+}
+
+#[test]
+fn the_sources_of_a_folder_are_checked_each_by_itself() {
+    let folder = Folder::new("checking-folder");
+    // Each defines the same function: as one program they would not be.
+    folder.file("one.esl", "(require \"shared\") (defun run (x) 1)");
+    folder.file("deep/two.esl", "(defun run () 2)");
+    folder.file("shared.esl", UNUSED);
+    for arguments in [&["check"][..], &["check", "."]] {
+        let (status, errors) = run(&folder, arguments);
+        assert_eq!(status, Some(0), "{errors}");
+        // A module that another file requires is told of once.
+        assert_eq!(errors.matches("`speed`").count(), 1, "{errors}");
+        assert!(errors.contains("`x`"), "{errors}");
+    }
+    folder.file("deep/open.esl", "(print 1");
+    assert_eq!(run(&folder, &["check", "deep"]).0, Some(3));
+    std::fs::create_dir(folder.join("empty")).expect("it is made");
+    let (status, errors) = run(&folder, &["check", "empty"]);
+    assert_eq!(status, Some(2));
+    assert!(errors.contains("no source (*.esl) is in empty"), "{errors}");
+}
+
+#[test]
+fn a_wrong_subcommand_is_told_what_to_type() {
+    let folder = Folder::with("checking-habits", &[("hello.esl", "(print 1)")]);
+    let said = |command: &mut std::process::Command| {
+        let finished = process::run(command.current_dir(folder.path()), "");
+        assert_eq!(finished.status, Some(2), "{}", finished.errors);
+        finished.errors
+    };
+    for (arguments, wanted) in [
+        (&["hello.esl", "1"][..], "type `eslvm run hello.esl 1`"),
+        (&["missing.esl"], "type `eslvm run missing.esl`"),
+        (&["check", "hello.esl"], "type `eslc check hello.esl`"),
+    ] {
+        let errors = said(&mut eslvm(arguments));
+        assert!(errors.contains(wanted), "{errors}");
+    }
+    for (arguments, wanted) in [
+        (&["indent"][..], "type `eslc format`"),
+        (&["hello.esl"], "type `eslc check hello.esl`"),
+        (&["run", "hello.esl"], "type `eslvm run hello.esl`"),
+    ] {
+        let errors = said(&mut eslc(arguments));
+        assert!(errors.contains(wanted), "{errors}");
+    }
+}

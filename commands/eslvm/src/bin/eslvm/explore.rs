@@ -1,0 +1,68 @@
+//! `eslvm explore`.
+
+use std::path::{Path, PathBuf};
+
+use esl::module_path::ModulePath;
+use esl::program::{self, Modules};
+use esl_command as command;
+use esl_command::{NOT_COMPILED, ProgramFile};
+use esl_compiler::diagnostic::{Format, Renderer};
+use esl_testing::explore;
+use eslvm::explore::{ExplorationOptions, run};
+
+use crate::options::{ExploreArguments, GrainChoice, TimersChoice};
+use crate::processors;
+use crate::program::compiling;
+
+/// Explores the schedules of a program. Returns the exit status.
+///
+/// # Errors
+/// The exit status, after a message.
+pub(crate) fn run_explore(
+    file: &Path,
+    options: &ExploreArguments,
+    library: &[PathBuf],
+    is_quiet: bool,
+) -> Result<u8, u8> {
+    if let Some(timeline) = &options.timeline {
+        command::refuse_overwriting(timeline, [file])?;
+    }
+    let path = ModulePath::new([file], library);
+    let program = match command::read_program(file)? {
+        ProgramFile::Compiled(program) => program,
+        ProgramFile::Source(source) => {
+            let compile = || program::compile_with(&[source], &path, Modules::Inside);
+            let compiled = compiling(file, is_quiet, compile);
+            let color = command::wants_color();
+            command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
+            compiled.program.ok_or(NOT_COMPILED)?
+        }
+    };
+    let grain = options.grain.map(|grain| match grain {
+        GrainChoice::Changes => explore::Grain::Changes,
+        GrainChoice::Reads => explore::Grain::Reads,
+        GrainChoice::Variables => explore::Grain::Variables,
+        GrainChoice::Ticks => explore::Grain::Ticks,
+    });
+    let settings = explore::Settings {
+        timers: match options.timers {
+            TimersChoice::Idle => explore::TimerGrain::Idle,
+            TimersChoice::Any => explore::TimerGrain::Any,
+        },
+        memory: options.memory,
+        states: usize::try_from(options.states).unwrap_or(usize::MAX),
+        switches: options.switches,
+        faults: options.faults,
+        output: false,
+        ..explore::Settings::default()
+    };
+    let time = std::time::Duration::from_secs(u64::from(options.time));
+    let (timeline, json) = (options.timeline.clone(), options.json);
+    let jobs = options.jobs.map_or_else(processors, usize::from);
+    Ok(run(
+        &program,
+        file,
+        &path,
+        &ExplorationOptions { settings, grain, jobs, time, timeline, json, is_quiet },
+    ))
+}

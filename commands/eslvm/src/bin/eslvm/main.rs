@@ -1,0 +1,162 @@
+//! `eslvm`: runs ESL programs, and the REPL.
+#![forbid(unsafe_code)]
+#![allow(clippy::print_stderr, reason = "commands print")]
+
+mod explore;
+mod figures;
+mod options;
+mod program;
+mod run;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::CommandFactory;
+use esl::Config;
+use esl::host::RealHost;
+use esl::module_path::ModulePath;
+use esl_command as command;
+use eslvm::repl::AttachSecurity;
+use eslvm::{explore::read_schedule, replay, testing};
+
+use explore::run_explore;
+use options::{ClockChoice, CompilingOptions, Eslvm, EslvmAction};
+use run::{RunReports, run};
+
+/// Lets the process have as many open files and connections as the system allows it.
+#[cfg(unix)]
+fn raise_limit_of_descriptors() {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let limit = getrlimit(Resource::Nofile);
+    // A system that refuses leaves the limit as it is.
+    _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
+}
+
+/// Words in place of a subcommand, and what to type.
+const HABITS: command::Habits = &[
+    ("exec", "eslvm run"),
+    ("start", "eslvm run"),
+    ("debug", "eslvm replay"),
+    ("shell", "eslvm repl"),
+    ("check", "eslc check"),
+    ("lint", "eslc check"),
+    ("compile", "eslc compile"),
+    ("build", "eslc compile"),
+    ("format", "eslc format"),
+    ("fmt", "eslc format"),
+    ("new", "eslc new"),
+    ("init", "eslc new"),
+    ("lsp", "eslc lsp"),
+    ("expand", "eslc expand"),
+    ("disasm", "eslc disasm"),
+];
+
+fn main() -> ExitCode {
+    #[cfg(unix)]
+    raise_limit_of_descriptors();
+    esl_vm::allocator::return_large_blocks();
+    let status = match command::parse::<Eslvm>("eslvm run", HABITS).action {
+        EslvmAction::Run {
+            mut options,
+            compiling: CompilingOptions { modules, quiet: is_quiet },
+            speed,
+            stats,
+            tier,
+            timeline,
+            profile,
+            profile_unit,
+            coverage,
+            schedule,
+            record,
+            mut trace,
+            full,
+            operate,
+            file,
+            arguments,
+        } => {
+            if schedule.is_some() {
+                options.clock = ClockChoice::Virtual;
+            }
+            if full {
+                trace.push("full".into());
+            }
+            let path = ModulePath::new([file.as_path()], &modules.library);
+            let rights = options.rights.rights();
+            rights.and_then(|rights| {
+                let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
+                let schedule = schedule.as_deref().map(read_schedule).transpose()?;
+                let reports = RunReports {
+                    stats,
+                    tier,
+                    timeline: timeline.as_deref(),
+                    profile: profile.as_deref(),
+                    profile_unit,
+                    coverage: coverage.as_deref(),
+                    record: record.as_deref(),
+                    trace: &trace,
+                    operate: &operate,
+                    is_quiet,
+                };
+                run(&file, host, &options, &reports, schedule.as_ref(), &path)
+            })
+        }
+        EslvmAction::Replay { options } => replay::run(&options),
+        EslvmAction::Test {
+            filter,
+            watch,
+            jobs,
+            seed,
+            junit,
+            coverage,
+            budget,
+            memory,
+            compiling,
+            rights,
+            sources,
+        } => {
+            let CompilingOptions { modules, quiet: is_quiet } = compiling;
+            rights.rights().map(|rights| {
+                let config = Config { budget: Some(budget), memory, ..Config::default() };
+                let jobs = jobs.map_or_else(processors, usize::from);
+                testing::run(
+                    &sources,
+                    &modules.library,
+                    &testing::Options {
+                        filter,
+                        is_watching: watch,
+                        jobs,
+                        seed,
+                        junit,
+                        coverage,
+                        config,
+                        rights,
+                        is_quiet,
+                    },
+                )
+            })
+        }
+        EslvmAction::Completions { shell } => Ok(command::print_completions(shell, Eslvm::command())),
+        EslvmAction::Man { folder } => Ok(command::write_man_pages(Eslvm::command(), folder.as_deref())),
+        EslvmAction::Explore { options, compiling, file } => {
+            run_explore(&file, &options, &compiling.modules.library, compiling.quiet)
+        }
+        EslvmAction::Attach { secret_file, tls, ca_file, rights, address } => {
+            let security = match (tls, &ca_file) {
+                (false, None) => AttachSecurity::Plain,
+                (_, ca_file) => AttachSecurity::Tls(ca_file.as_deref()),
+            };
+            let attach = |rights| eslvm::repl::attach(&address, security, secret_file.as_deref(), &rights);
+            rights.rights().and_then(attach)
+        }
+        EslvmAction::Repl { options, modules } => options.rights.rights().and_then(|rights| {
+            let path = ModulePath::new([Path::new("-")], &modules.library);
+            eslvm::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
+        }),
+    };
+    ExitCode::from(status.unwrap_or_else(|status| status))
+}
+
+/// Returns the number of processors.
+pub(crate) fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}

@@ -1,0 +1,362 @@
+//! Arguments of the command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use esl::Config;
+use esl::size::{parse_size, parse_stack};
+use esl_vm::value::Value;
+use esl_vm::vm::Tier;
+use eslvm::operate::OperateOptions;
+use eslvm::profile::ProfileUnit;
+use eslvm::replay::ReplayOptions;
+use eslvm::rights::RightsOptions;
+
+/// The virtual machine of ESL, the Execution Support Language.
+#[derive(Parser)]
+#[command(name = "eslvm", version, propagate_version = true, max_term_width = 100)]
+pub(crate) struct Eslvm {
+    #[command(subcommand)]
+    pub(crate) action: EslvmAction,
+}
+
+/// Where required modules are.
+#[derive(Args)]
+pub(crate) struct LibraryOption {
+    /// Folder to search for required modules, after the folder of the program and before those of
+    /// ESL_LIBRARY
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) library: Vec<PathBuf>,
+}
+
+/// Options of the commands that compile files.
+#[derive(Args)]
+pub(crate) struct CompilingOptions {
+    #[command(flatten)]
+    pub(crate) modules: LibraryOption,
+    /// Show no progress line at a terminal
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Subcommand)]
+#[allow(clippy::large_enum_variant, reason = "there is one, which is made once")]
+pub(crate) enum EslvmAction {
+    /// Run a program
+    ///
+    /// Exit status: 0 success, or the status that the program asks for; 1 a failure left the main task; 2
+    /// wrong usage, or a file that cannot be read or written; 3 the program does not compile or is refused;
+    /// 4 no task can ever run again; 5 the budget or the memory is spent; 129, 130, 143 ended by SIGHUP,
+    /// SIGINT or SIGTERM. However the run ends, the cleanups of its tasks are run.
+    Run {
+        #[command(flatten)]
+        options: MachineOptions,
+        #[command(flatten)]
+        compiling: CompilingOptions,
+        /// Seconds of the program's clock in a second of real time:
+        /// for a program whose outside is a simulator
+        #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_speed)]
+        speed: f64,
+        /// Print figures of the run to standard error at its end; with `=tasks` or `=functions`, also of
+        /// those with most ticks; with `=coverage`, also what was not run
+        #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
+        stats: Option<Stats>,
+        /// How functions run, which no program can tell: by the interpreter, all as machine code, or as
+        /// machine code those that are hot, which is the default. A build without the cargo feature `native`
+        /// says that the option has no effect, and interprets all
+        #[arg(long, value_enum, value_name = "TIER", conflicts_with = "schedule")]
+        tier: Option<TierChoice>,
+        /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
+        /// Perfetto
+        #[arg(long, value_name = "FILE")]
+        timeline: Option<PathBuf>,
+        /// Run the program by a schedule that `eslvm explore` has written; its clock is virtual then
+        #[arg(long, value_name = "FILE")]
+        schedule: Option<PathBuf>,
+        /// Record the run in a file, for `eslvm replay`: the program, and everything that reaches it
+        #[arg(long, value_name = "FILE")]
+        record: Option<PathBuf>,
+        /// Write to a file which tasks, calls and lines have used the ticks and the time: a flame graph if
+        /// its name ends in `.svg`, for speedscope if it ends in `.json`, else a line for each stack
+        #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
+        profile: Option<PathBuf>,
+        /// Unit of a flame graph and of lines of stacks; data for speedscope have both units
+        #[arg(long, value_enum, default_value_t = ProfileUnit::Ticks, value_name = "UNIT")]
+        #[arg(requires = "profile")]
+        profile_unit: ProfileUnit,
+        /// Write to a file, in the form of lcov, how often each line, function and arm was run
+        #[arg(long, value_name = "FILE", conflicts_with_all = ["schedule", "record"])]
+        coverage: Option<PathBuf>,
+        /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
+        #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
+        trace: Vec<String>,
+        /// Show all calls of the library in reports of failures, which are folded otherwise
+        #[arg(long)]
+        full: bool,
+        #[command(flatten)]
+        operate: OperateOptions,
+        /// Source or bytecode file; `-` is a source from standard input
+        file: PathBuf,
+        /// Arguments of the program
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARG")]
+        arguments: Vec<String>,
+    },
+    /// Run a recorded run again, forwards and backwards
+    ///
+    /// Needs neither the sources nor the world of the program, and waits for nothing. With --until or
+    /// --break the replay stops there and takes commands from standard input: `help` lists them. Exit
+    /// status: that of the recorded run; 0 if the recording ends before the run, or after commands; 2 wrong
+    /// usage, or a file that cannot be read; 3 the recording is damaged; 6 the replay
+    /// has diverged, or would, since the recording is of another version.
+    Replay {
+        #[command(flatten)]
+        options: ReplayOptions,
+    },
+    /// Run the tests of programs
+    ///
+    /// Each test (`deftest`) runs in a machine of its own, whose clock is virtual. Exit status: 0 all
+    /// passed; 1 a test failed; 2 wrong usage, or a file that cannot be read or written; 3 a file does not
+    /// compile or is refused, or has two tests of one name; 5 there was no test to run.
+    Test {
+        /// Only tests whose names contain this word, in any case
+        #[arg(long, value_name = "WORD")]
+        filter: Option<String>,
+        /// Run the tests again whenever a source beside them changes, until the command is interrupted
+        #[arg(long, conflicts_with_all = ["junit", "coverage"])]
+        watch: bool,
+        /// Number of tests that run at the same time, by default that of the processors
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+        jobs: Option<u16>,
+        /// Run each test with this seed only
+        #[arg(long, value_name = "N")]
+        seed: Option<u64>,
+        /// Write a report in the form of JUnit to a file
+        #[arg(long, value_name = "FILE")]
+        junit: Option<PathBuf>,
+        /// Write to a file, in the form of lcov, how often each line, function and arm was run, and print
+        /// what was not
+        #[arg(long, value_name = "FILE")]
+        coverage: Option<PathBuf>,
+        /// Most ticks of a run of a test
+        #[arg(long, value_name = "TICKS", default_value_t = 1_000_000_000)]
+        budget: u64,
+        /// Most memory for objects of a test, such as 64M or 2G
+        #[arg(long, value_name = "SIZE", default_value = "1G", value_parser = parse_size)]
+        memory: usize,
+        #[command(flatten)]
+        compiling: CompilingOptions,
+        #[command(flatten)]
+        rights: RightsOptions,
+        /// Source or bytecode files, or folders, of which those sources are meant that are named `test.esl`,
+        /// `tests.esl`, `*_test.esl` or `*-test.esl`, or are in a folder `tests`; by default this folder
+        #[arg(value_name = "FILE")]
+        sources: Vec<PathBuf>,
+    },
+    /// Run a program under all schedules
+    ///
+    /// Lets the tasks of the program take turns in every possible order, and reports the orders that end
+    /// badly: by a deadlock, a failure of the main task, a status other than 0. Writes each as a schedule,
+    /// which `eslvm run --schedule` repeats. Exit status: 0 no schedule ends badly; 1 one does; 2 wrong
+    /// usage, or a file that cannot be read or written; 3 the program does not compile or is refused; 7
+    /// none was found, which is no proof: not all were tried, or the grain does not see all that tasks share.
+    Explore {
+        #[command(flatten)]
+        options: ExploreArguments,
+        #[command(flatten)]
+        compiling: CompilingOptions,
+        /// Source or bytecode file
+        file: PathBuf,
+    },
+    /// Attach to a run that was begun with --listen
+    ///
+    /// Lines are typed here as in the REPL, and evaluated in the run, which goes on meanwhile and
+    /// afterwards; `:help` lists commands. Exit status: 0 the session has ended; 1 the run has; 2 no run
+    /// can be reached, or it refuses the secret; 3 the last form is incomplete.
+    Attach {
+        /// File with the secret that a port asks for; otherwise it is that of the environment variable
+        /// ESL_SECRET
+        #[arg(long, value_name = "FILE")]
+        secret_file: Option<PathBuf>,
+        /// Speak TLS, as a run does that was begun with --certificate
+        #[arg(long)]
+        tls: bool,
+        /// The same, with a run whose certificate is in this file, in PEM, or signed by one of it
+        #[arg(long, value_name = "FILE")]
+        ca_file: Option<PathBuf>,
+        #[command(flatten)]
+        rights: RightsOptions,
+        /// Path or port that was given to --listen
+        #[arg(value_name = "PATH|[ADDRESS:]PORT")]
+        address: String,
+    },
+    /// Read forms, evaluate them and print their values
+    Repl {
+        #[command(flatten)]
+        options: MachineOptions,
+        #[command(flatten)]
+        modules: LibraryOption,
+    },
+    /// Print the completions for a shell
+    ///
+    /// For bash: eslvm completions bash > ~/.local/share/bash-completion/completions/eslvm
+    Completions {
+        /// Shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages
+    Man {
+        /// Folder to write them to, one page for each subcommand; without it, the first page is printed
+        folder: Option<PathBuf>,
+    },
+}
+
+/// Subject of the figures that are printed.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Stats {
+    /// The run
+    Run,
+    /// The run and its tasks
+    Tasks,
+    /// The run and its functions
+    Functions,
+    /// The run, and which lines and arms of the program it has not reached
+    Coverage,
+}
+
+/// How functions run.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum TierChoice {
+    /// By the interpreter
+    Interpreter,
+    /// All as machine code, from their second call on
+    Native,
+    /// As machine code those that are hot
+    Auto,
+}
+
+impl From<TierChoice> for Tier {
+    fn from(choice: TierChoice) -> Tier {
+        match choice {
+            TierChoice::Interpreter => Tier::Interpreter,
+            TierChoice::Native => Tier::Native,
+            TierChoice::Auto => Tier::Auto,
+        }
+    }
+}
+
+/// Clock of a program.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum ClockChoice {
+    /// Real time
+    Real,
+    /// Time that stands still until all tasks wait, and then jumps to the first time that one waits for
+    Virtual,
+}
+
+#[derive(Args)]
+pub(crate) struct MachineOptions {
+    /// Clock of the program
+    #[arg(long, value_enum, default_value = "real")]
+    pub(crate) clock: ClockChoice,
+    /// Seed of the choices that the language leaves open, such as which task runs next
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Ticks that a task runs before the next task has its turn
+    #[arg(long, value_name = "TICKS", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    pub(crate) slice: u32,
+    /// End the run with status 5 after this many ticks
+    #[arg(long, value_name = "TICKS")]
+    pub(crate) budget: Option<u64>,
+    /// Most memory for objects, such as 64M or 2G
+    #[arg(long, value_name = "SIZE", default_value = "1G", value_parser = parse_size)]
+    pub(crate) memory: usize,
+    /// Most seconds that the cleanups of an aborted task may take, also at the end of the run
+    #[arg(long, value_name = "SECONDS", default_value_t = 60)]
+    pub(crate) cleanup_time: u32,
+    /// Most memory for the stack of a task, such as 16M; half of --memory without it
+    #[arg(long, value_name = "SIZE", value_parser = parse_stack)]
+    pub(crate) stack: Option<usize>,
+    #[command(flatten)]
+    pub(crate) rights: RightsOptions,
+}
+
+impl MachineOptions {
+    /// Returns the configuration of a machine.
+    pub(crate) fn config(&self) -> Config {
+        Config {
+            memory: self.memory,
+            stack: self.stack.map(|bytes| bytes / size_of::<Value>()),
+            slice: self.slice,
+            budget: self.budget,
+            seed: self.seed,
+            cleanup_time: u64::from(self.cleanup_time) * 1_000_000_000,
+            ..Config::default()
+        }
+    }
+}
+
+#[derive(Args)]
+pub(crate) struct ExploreArguments {
+    /// Where a task may have to let others go first; a finer grain sees more, and has more states. By default
+    /// it is variables, and then ticks if the program changes what variables does not see
+    #[arg(long, value_enum)]
+    pub(crate) grain: Option<GrainChoice>,
+    /// Number of threads, by default that of the processors; the findings do not depend on it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) jobs: Option<u16>,
+    /// Most states
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) states: u64,
+    /// Most memory of the exploration, for states and for snapshots, such as 64M or 2G; less makes it slower
+    #[arg(long, value_name = "SIZE", default_value = "512M", value_parser = parse_size)]
+    pub(crate) memory: usize,
+    /// Most seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 60)]
+    pub(crate) time: u32,
+    /// When timers end: when all tasks wait (idle), or at any point, as if what tasks do took so long (any)
+    #[arg(long, value_enum, default_value = "idle")]
+    pub(crate) timers: TimersChoice,
+    /// Most switches of a schedule: points at which a task that could go on lets another one go first
+    #[arg(long, value_name = "N")]
+    pub(crate) switches: Option<usize>,
+    /// Most times that CHOOSE takes another form than its first
+    #[arg(long, value_name = "N")]
+    pub(crate) faults: Option<usize>,
+    /// Write a timeline of the first finding to a file: a drawing if its name ends in `.svg`, else a trace
+    /// for Perfetto
+    #[arg(long, value_name = "FILE")]
+    pub(crate) timeline: Option<PathBuf>,
+    /// Print findings and figures as JSON, an object a line
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Where a task may have to let others go first.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum GrainChoice {
+    /// Before it changes what others can see, or begins to wait
+    Changes,
+    /// Also before it looks at what others have changed
+    Reads,
+    /// Also after it has read or set a variable of the program
+    Variables,
+    /// At every tick, which is wherever the machine can preempt it
+    Ticks,
+}
+
+/// When timers end.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum TimersChoice {
+    /// When all tasks wait
+    Idle,
+    /// At any point
+    Any,
+}
+
+/// Parses the speed of the program's clock.
+fn parse_speed(text: &str) -> Result<f64, &'static str> {
+    match text.parse() {
+        Ok(speed) if (1e-6..=1e6).contains(&speed) => Ok(speed),
+        _ => Err("expected a number from 0.000001 to 1000000"),
+    }
+}

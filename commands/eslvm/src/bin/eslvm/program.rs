@@ -1,0 +1,67 @@
+//! Reading and compiling the program that is to be run or explored.
+
+use std::path::Path;
+
+use esl::host::ProcessSignal;
+use esl::module_path::ModulePath;
+use esl::program::{self, Compiled, Ended, Program};
+use esl_command as command;
+use esl_command::{NOT_COMPILED, ProgramFile, complain};
+use esl_compiler::diagnostic::{Format, Renderer};
+use esl_testing::coverage::Coverage;
+use eslvm::signal::SignalTarget;
+
+use crate::options::MachineOptions;
+
+/// Reads the program in a file, and compiles it if it is a source, within the limits of its run. Returns
+/// its coverage too, if that `is_covered`.
+///
+/// # Errors
+/// The exit status, after a message.
+pub(crate) fn program(
+    file: &Path,
+    path: &ModulePath,
+    options: &MachineOptions,
+    is_covered: bool,
+    is_quiet: bool,
+    signals: &SignalTarget,
+) -> Result<(Program, Option<Coverage>), u8> {
+    let source = match command::read_program(file)? {
+        ProgramFile::Compiled(_) if is_covered => return Err(command::refuse_compiled(file)),
+        ProgramFile::Compiled(program) => return Ok((program, None)),
+        ProgramFile::Source(source) => source,
+    };
+    let mut watch = |inbox| signals.set(inbox);
+    let config = options.config();
+    let compile = || program::compile_for_run(&[source], path, is_covered, &config, &mut watch);
+    let compiled = compiling(file, is_quiet, compile);
+    if let Some(ended) = compiled.stopped {
+        match ended {
+            Ended::BudgetSpent => complain("compiling the program exceeds the budget"),
+            Ended::Signalled(signal) => complain_of_signal(signal),
+            _ => {
+                complain(format_args!("compiling the program exceeds {} MiB of memory", config.memory >> 20))
+            }
+        }
+        return Err(ended.exit_status());
+    }
+    let color = command::wants_color();
+    command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
+    let coverage = is_covered.then(|| Coverage::new(&compiled));
+    Ok((compiled.program.ok_or(NOT_COMPILED)?, coverage))
+}
+
+/// Compiles a program, and says at a terminal that it takes long, if it does.
+pub(crate) fn compiling(file: &Path, is_quiet: bool, compile: impl FnOnce() -> Compiled) -> Compiled {
+    command::StatusLine::new(is_quiet).during(|| format!("compiling {}", file.display()), compile)
+}
+
+/// Prints that a signal has ended the run.
+pub(crate) fn complain_of_signal(signal: ProcessSignal) {
+    match signal {
+        ProcessSignal::HangUp => complain("hung up"),
+        ProcessSignal::Interrupt => complain("interrupted"),
+        ProcessSignal::Terminate => complain("terminated"),
+        other => complain(format_args!("ended by signal {}", other.number())),
+    }
+}

@@ -1,0 +1,83 @@
+//! The options of `eslvm run` by which a run is operated from outside.
+//!
+//! ```
+//! use clap::Parser;
+//! use esl::Config;
+//! use esl::host::VirtualHost;
+//! use esl::program::{Source, begin, compile, machine};
+//! use eslvm::operate::OperateOptions;
+//!
+//! #[derive(Parser)]
+//! struct Options {
+//!     #[command(flatten)]
+//!     operate: OperateOptions,
+//! }
+//!
+//! let options = Options::parse_from(["rover", "--metrics", "0"]);
+//! let mut machine = machine(Config::default(), Box::new(VirtualHost::new()))?;
+//! // Prints the address at which the figures are. They are served until this is dropped.
+//! let served = options.operate.begin(&mut machine, "rover.esl").expect("any port will do");
+//! let program = compile(&[Source::new("rover.esl", "(sleep 60)")]).program.expect("there are no errors");
+//! begin(&mut machine, &program)?;
+//! machine.run(u64::MAX);
+//! drop(served);
+//! # Ok::<(), esl::Error>(())
+//! ```
+#![allow(clippy::print_stderr, reason = "commands say where they can be reached")]
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Args;
+use esl_command::{USAGE, complain};
+use esl_operate::{ServedPlaces, ServedRun, parse_address};
+use esl_vm::vm::Vm;
+
+/// Options by which a run can be operated from outside.
+#[derive(Args, Clone, Debug, Default)]
+pub struct OperateOptions {
+    /// Serve figures of the run to Prometheus at this port, of 127.0.0.1 unless an address comes before it
+    #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = parse_address)]
+    metrics: Option<SocketAddr>,
+    /// Let operators attach to the run, by `eslvm attach`, at the path of a socket that only its owner can
+    /// open, or at a port, of 127.0.0.1 unless an address comes before it, which asks for a secret
+    #[arg(long, value_name = "PATH|[ADDRESS:]PORT")]
+    listen: Option<String>,
+    /// Show the run in a browser, at a port of 127.0.0.1 unless an address comes before it; any free one
+    /// without a number
+    #[arg(long, value_name = "[ADDRESS:]PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0",
+          value_parser = parse_address)]
+    monitor: Option<SocketAddr>,
+    /// File with the secrets of the roles: lines such as `observe SECRET`, `command SECRET` and `patch
+    /// SECRET`; without it they are made anew for each run, and printed
+    #[arg(long, value_name = "FILE")]
+    secrets: Option<PathBuf>,
+    /// Have all that listens at a port speak TLS, with the certificates of this file, in PEM; an address that
+    /// other machines reach asks for it
+    #[arg(long, value_name = "FILE", requires = "key")]
+    certificate: Option<PathBuf>,
+    /// File with the key of the certificate, in PEM
+    #[arg(long, value_name = "FILE", requires = "certificate")]
+    key: Option<PathBuf>,
+}
+
+impl OperateOptions {
+    /// Begins to serve what was asked for, before the machine runs a program of this name. Returns what is
+    /// to be told of the end, and dropped after the run.
+    ///
+    /// # Errors
+    /// The exit status, after a message.
+    pub fn begin(&self, machine: &mut Vm, program: &str) -> Result<ServedRun, u8> {
+        let places = ServedPlaces {
+            metrics: self.metrics,
+            listen: self.listen.clone(),
+            monitor: self.monitor,
+            secrets: self.secrets.clone(),
+            identity: self.certificate.clone().zip(self.key.clone()),
+        };
+        places.begin(machine, program, &mut |line| eprintln!("{line}")).map_err(|error| {
+            complain(error);
+            USAGE
+        })
+    }
+}

@@ -1,0 +1,116 @@
+//! `eslvm replay`.
+#![allow(clippy::print_stdout, reason = "commands print")]
+
+mod session;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::Args;
+use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain, refuse_overwriting};
+use esl_host::Output;
+use esl_replay::{Breakpoint, Recorded, RecordedError, Replayed, Rerun, RerunError, Target};
+use esl_timeline::Timeline;
+
+/// Options of a replay.
+#[derive(Args, Clone, Debug)]
+pub struct ReplayOptions {
+    /// Stop at a place of the run: tick:N, turn:N, time:SECONDS or failure
+    #[arg(long, value_name = "PLACE", value_parser = Target::from_str)]
+    until: Option<Target>,
+    /// Stop at what happens: failure, failure:CAUSE, task:NAME, fact:PATTERN or function:NAME
+    #[arg(long = "break", value_name = "WHAT", value_parser = Breakpoint::from_str)]
+    breakpoints: Vec<Breakpoint>,
+    /// Print nothing of the program; say whether the replay is the recorded run
+    #[arg(long, conflicts_with_all = ["until", "breakpoints"])]
+    check: bool,
+    /// Write a timeline of the replay to a file: a drawing if its name ends in `.svg`, else a trace for
+    /// Perfetto
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["until", "breakpoints"])]
+    timeline: Option<PathBuf>,
+    /// File of a recorded run
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+}
+
+/// Replays a recorded run. Returns the exit status.
+///
+/// # Errors
+/// The exit status, after a message, if there is nothing to replay.
+pub fn run(options: &ReplayOptions) -> Result<u8, u8> {
+    let file = &options.file;
+    let bytes = std::fs::read(file).map_err(|error| {
+        complain(format_args!("{} cannot be read: {error}", file.display()));
+        USAGE
+    })?;
+    let recorded = Recorded::read(&bytes).map_err(|error| refused(file, &RerunError::Recording(error)))?;
+    if options.until.is_some() || !options.breakpoints.is_empty() {
+        return session::run(recorded, options.until.clone(), options.breakpoints.clone())
+            .map_err(|error| refused(file, &error));
+    }
+    let is_quiet = options.check;
+    let screen = move |output, bytes: &[u8]| {
+        if !is_quiet {
+            show(output, bytes);
+        }
+    };
+    let mut rerun = Rerun::begin(&recorded, screen).map_err(|error| refused(file, &error))?;
+    let mut timeline = None;
+    if let Some(path) = &options.timeline {
+        refuse_overwriting(path, [file.as_path()])?;
+        let begun = Timeline::begin(path, rerun.machine_mut()).map_err(|error| not_written(path, &error))?;
+        timeline = Some((begun, path));
+    }
+    let replayed = rerun.run(u64::MAX).cloned().unwrap_or(Replayed::Cut);
+    if let Some((timeline, path)) = timeline {
+        timeline.end(rerun.machine_mut()).map_err(|error| not_written(path, &error))?;
+    }
+    let status = match &replayed {
+        Replayed::Equal(status) => *status,
+        Replayed::Cut => SUCCESS,
+        Replayed::Diverged(text) => {
+            complain(text);
+            DIVERGED
+        }
+    };
+    if replayed == Replayed::Cut && !options.check {
+        complain(format_args!(
+            "the recording ends here, at tick {}: the run was killed, or the system has refused it memory",
+            rerun.check().ticks
+        ));
+    }
+    if options.check && status != DIVERGED {
+        let ((checks, _), ticks) = (rerun.host().checks(), rerun.check().ticks);
+        let ending = match replayed {
+            Replayed::Equal(status) => format!("status {status}"),
+            _ => "the end of the recording, before that of the run".into(),
+        };
+        println!("equal: {} records, {checks} checks, {ticks} ticks, {ending}", rerun.host().replayed());
+        return Ok(SUCCESS);
+    }
+    Ok(status)
+}
+
+/// Writes a piece of the program's output.
+pub(super) fn show(output: Output, bytes: &[u8]) {
+    // A closed output does not stop a replay.
+    _ = match output {
+        Output::Standard => std::io::stdout().lock().write_all(bytes),
+        Output::Error => std::io::stderr().lock().write_all(bytes),
+    };
+}
+
+fn refused(file: &Path, error: &RerunError) -> u8 {
+    complain(format_args!("{} cannot be replayed: {error}", file.display()));
+    match error {
+        // The run that this machine would make of it is another one.
+        RerunError::Recording(RecordedError::OtherMachine | RecordedError::Format(_)) => DIVERGED,
+        _ => NOT_COMPILED,
+    }
+}
+
+fn not_written(path: &Path, error: &std::io::Error) -> u8 {
+    complain(format_args!("{} cannot be written: {error}", path.display()));
+    USAGE
+}

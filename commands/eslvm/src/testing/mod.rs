@@ -1,0 +1,361 @@
+//! `eslvm test`: the tests of several files, in several threads, and what is said of them.
+#![allow(clippy::print_stdout, reason = "commands print")]
+
+mod junit;
+mod watch;
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use esl::module_path::ModulePath;
+use esl::program::{self, Modules, Program};
+use esl_command as command;
+use esl_command::{
+    FAILED, NO_TESTS, NOT_COMPILED, ProgramFile, SUCCESS, StatusLine, USAGE, complain, refuse_compiled,
+};
+use esl_compiler::diagnostic::{Format, Renderer};
+use esl_host::Rights;
+use esl_testing::coverage::{Coverage, CoverageReport};
+use esl_testing::{Setup, Test, Verdict, list, run_test};
+use esl_vm::vm::Config;
+
+/// Which tests to run, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Only tests whose names contain this, in any case.
+    pub filter: Option<String>,
+    /// Whether to run them again whenever a source changes.
+    pub is_watching: bool,
+    /// Number of tests that run at the same time.
+    pub jobs: usize,
+    /// The one seed to run tests with, in place of their own.
+    pub seed: Option<u64>,
+    /// File for a report in JUnit's form.
+    pub junit: Option<PathBuf>,
+    /// File for the coverage of the tests, in lcov's form.
+    pub coverage: Option<PathBuf>,
+    /// Limits of each test.
+    pub config: Config,
+    /// The rights of a test.
+    pub rights: Rights,
+    /// Whether a terminal is not to be told how far the tests are.
+    pub is_quiet: bool,
+}
+
+/// A file with tests.
+struct Suite<'a> {
+    file: &'a Path,
+    program: Program,
+    setup: Setup,
+}
+
+/// A test of a file, and what became of it.
+pub(super) struct Run<'a> {
+    suite: &'a Suite<'a>,
+    pub(super) test: Test,
+    pub(super) result: Mutex<Option<FinishedTest>>,
+}
+
+impl Run<'_> {
+    /// Returns the name of the file.
+    pub(super) fn file(&self) -> String {
+        self.suite.file.display().to_string()
+    }
+}
+
+/// The outcome of a test.
+pub(super) struct FinishedTest {
+    pub(super) verdict: Verdict,
+    /// Seed with which it has failed.
+    seed: Option<u64>,
+    pub(super) time: Duration,
+}
+
+/// Runs the tests of `paths`, files and folders, and prints what becomes of them; again and again if that is
+/// wanted. Returns the exit status.
+pub fn run(paths: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
+    if !options.is_watching {
+        return run_once(paths, library, options);
+    }
+    let folders = watch::folders(paths);
+    loop {
+        let before = watch::state(&folders);
+        run_once(paths, library, options);
+        println!("\nwaiting for a change of a source; Ctrl-C ends");
+        watch::wait(&folders, &before);
+        println!();
+    }
+}
+
+/// The files in which tests are looked for.
+struct TestFiles {
+    files: Vec<PathBuf>,
+    /// Those of them that were named.
+    named: Vec<PathBuf>,
+    /// Folders in which no file has the name of one with tests.
+    without: Vec<PathBuf>,
+}
+
+impl TestFiles {
+    /// Finds the files with tests in folders.
+    ///
+    /// # Errors
+    /// The exit status, after a message.
+    fn find(paths: &[PathBuf]) -> Result<TestFiles, u8> {
+        let mut found = TestFiles { files: Vec::new(), named: Vec::new(), without: Vec::new() };
+        let here = [PathBuf::from(".")];
+        for path in if paths.is_empty() { &here[..] } else { paths } {
+            if !path.is_dir() {
+                found.named.push(path.clone());
+                found.files.push(path.clone());
+                continue;
+            }
+            let tests: Vec<PathBuf> = command::sources_in(path)?
+                .into_iter()
+                .filter(|file| command::is_test_file(path, file))
+                .collect();
+            if tests.is_empty() {
+                found.without.push(path.clone());
+            }
+            found.files.extend(tests);
+        }
+        let mut seen = std::collections::HashSet::new();
+        found.files.retain(|file| seen.insert(file.clone()));
+        Ok(found)
+    }
+
+    /// Says where no test was found. `total` is the number of all tests, before they are selected.
+    fn complain_of_none(&self, filter: Option<&str>, total: usize) {
+        if let (Some(filter), true) = (filter, total > 0) {
+            let tests = if total == 1 { "test" } else { "tests" };
+            return complain(format_args!(
+                "no name of a test contains `{filter}`; there are {total} {tests} in all"
+            ));
+        }
+        for folder in &self.without {
+            complain(format_args!(
+                "no file with tests is in {}: their names are test.esl, *_test.esl or *-test.esl, or they are in a \
+                 folder named tests; name any other file itself",
+                folder.display()
+            ));
+        }
+    }
+}
+
+/// Runs the tests of files and folders once. Returns the exit status.
+fn run_once(paths: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
+    match TestFiles::find(paths).and_then(|files| run_files(&files, library, options)) {
+        Ok(status) | Err(status) => status,
+    }
+}
+
+/// Runs the tests of files. Returns the exit status.
+///
+/// # Errors
+/// The exit status, after a message.
+fn run_files(found: &TestFiles, library: &[PathBuf], options: &Options) -> Result<u8, u8> {
+    let files = &found.files;
+    for output in [&options.junit, &options.coverage].into_iter().flatten() {
+        command::refuse_overwriting(output, files.iter().map(PathBuf::as_path))?;
+    }
+    let suites =
+        files.iter().map(|file| suite(file, library, options)).collect::<Result<Vec<Suite<'_>>, u8>>()?;
+    let mut runs = Vec::new();
+    let mut total = 0;
+    for suite in &suites {
+        let tests = list(&suite.program, &suite.setup).map_err(|error| {
+            complain(format_args!("{} has no tests to run: {error}", suite.file.display()));
+            FAILED
+        })?;
+        refuse_two_of_one_name(suite.file, &tests)?;
+        if tests.is_empty() && found.named.iter().any(|named| named == suite.file) {
+            complain(format_args!("{} has no tests: `deftest` defines one", suite.file.display()));
+        }
+        total += tests.len();
+        let wanted = tests.into_iter().filter(|test| is_wanted(test, options.filter.as_deref()));
+        runs.extend(wanted.map(|test| Run { suite, test, result: Mutex::default() }));
+    }
+    run_all(&runs, options);
+    let failed = runs.iter().filter(|run| has_failed(run)).count();
+    println!("{} passed, {failed} failed", runs.len() - failed);
+    if let Some(path) = &options.junit
+        && let Err(error) = std::fs::write(path, junit::report(&runs))
+    {
+        complain(format_args!("{} cannot be written: {error}", path.display()));
+        return Err(USAGE);
+    }
+    if let Some(path) = &options.coverage {
+        let mut report = CoverageReport::default();
+        for coverage in suites.iter().filter_map(|suite| suite.setup.coverage.as_ref()) {
+            report.merge(coverage.lock().unwrap_or_else(PoisonError::into_inner).report());
+        }
+        print!("\n{}", report.table());
+        if let Err(error) = std::fs::write(path, report.lcov()) {
+            complain(format_args!("{} cannot be written: {error}", path.display()));
+            return Err(USAGE);
+        }
+    }
+    if runs.is_empty() {
+        found.complain_of_none(options.filter.as_deref(), total);
+        return Ok(NO_TESTS);
+    }
+    Ok(if failed > 0 { FAILED } else { SUCCESS })
+}
+
+/// Refuses a file with two tests of one name, of which only one would count.
+///
+/// # Errors
+/// The exit status, after a message for each name.
+fn refuse_two_of_one_name(file: &Path, tests: &[Test]) -> Result<(), u8> {
+    let mut result = Ok(());
+    for (number, test) in tests.iter().enumerate() {
+        if let Some(first) = tests[..number].iter().find(|other| other.name == test.name) {
+            let (name, file) = (&test.name, file.display());
+            complain(format_args!(
+                "{file} has two tests `{name}`, at {} and at {}: rename one",
+                first.place, test.place
+            ));
+            result = Err(NOT_COMPILED);
+        }
+    }
+    result
+}
+
+/// Runs tests, several at a time, and prints what becomes of them in their order.
+fn run_all(runs: &[Run<'_>], options: &Options) {
+    let next = AtomicUsize::new(0);
+    // Number of the first test that was not told of.
+    let told = Mutex::new(0);
+    let status_line = StatusLine::new(options.is_quiet);
+    let run_all = || {
+        std::thread::scope(|scope| {
+            for _ in 0..options.jobs.clamp(1, runs.len().max(1)) {
+                scope.spawn(|| {
+                    while let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let finished = finish(run, options);
+                        *run.result.lock().unwrap_or_else(PoisonError::into_inner) = Some(finished);
+                        let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
+                        status_line.beneath(|| tell(runs, &mut told, options));
+                    }
+                });
+            }
+        });
+    };
+    status_line.during(|| progress(runs), run_all);
+}
+
+/// Says how many of the tests have ended, and which one goes on.
+fn progress(runs: &[Run<'_>]) -> String {
+    let has_ended = |run: &Run<'_>| run.result.lock().unwrap_or_else(PoisonError::into_inner).is_some();
+    let ended = runs.iter().filter(|run| has_ended(run)).count();
+    let first = runs.iter().find(|run| !has_ended(run)).map_or("", |run| &run.test.name);
+    format!("{ended} of {} tests; {first}", runs.len())
+}
+
+/// Reads and compiles a file.
+///
+/// # Errors
+/// The exit status, after a message.
+fn suite<'a>(file: &'a Path, library: &[PathBuf], options: &Options) -> Result<Suite<'a>, u8> {
+    let path = ModulePath::new([file], library);
+    let mut coverage = None;
+    let program = match command::read_program(file)? {
+        ProgramFile::Compiled(_) if options.coverage.is_some() => return Err(refuse_compiled(file)),
+        ProgramFile::Compiled(program) => program,
+        ProgramFile::Source(source) => {
+            let compile = || match &options.coverage {
+                Some(_) => program::compile_covered(&[source], &path),
+                None => program::compile_with(&[source], &path, Modules::Inside),
+            };
+            let line = || format!("compiling {}", file.display());
+            let compiled = StatusLine::new(options.is_quiet).during(line, compile);
+            let color = command::wants_color();
+            command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
+            coverage = options.coverage.is_some().then(|| Arc::new(Mutex::new(Coverage::new(&compiled))));
+            compiled.program.ok_or(NOT_COMPILED)?
+        }
+    };
+    let (config, rights) = (options.config.clone(), options.rights.clone());
+    let setup = Setup { config, path, rights, coverage };
+    Ok(Suite { file, program, setup })
+}
+
+fn is_wanted(test: &Test, filter: Option<&str>) -> bool {
+    filter.is_none_or(|filter| test.name.to_lowercase().contains(&filter.to_lowercase()))
+}
+
+fn has_failed(run: &Run<'_>) -> bool {
+    let result = run.result.lock().unwrap_or_else(PoisonError::into_inner);
+    result.as_ref().is_none_or(|finished| matches!(finished.verdict, Verdict::Failed { .. }))
+}
+
+/// Runs a test with each of its seeds, until it fails.
+fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
+    let start = Instant::now();
+    let seeds = match options.seed {
+        // An exploration tries everything that a seed can pick.
+        _ if run.test.explores.is_some() => 0..1,
+        Some(seed) => seed..seed.saturating_add(1),
+        None => 0..run.test.seeds,
+    };
+    let mut finished = FinishedTest { verdict: Verdict::Passed, seed: None, time: Duration::ZERO };
+    for seed in seeds {
+        let verdict = run_test(&run.suite.program, &run.test, seed, &run.suite.setup);
+        let verdict = verdict.unwrap_or_else(|error| Verdict::Failed {
+            why: "it cannot be begun".into(),
+            output: error.to_string(),
+        });
+        let seed = run.test.explores.is_none().then_some(seed);
+        match verdict {
+            Verdict::Passed => {}
+            Verdict::PassedAll(_) => finished = FinishedTest { verdict, ..finished },
+            Verdict::Failed { .. } => {
+                finished = FinishedTest { verdict, seed, ..finished };
+                break;
+            }
+        }
+    }
+    FinishedTest { time: start.elapsed(), ..finished }
+}
+
+/// Prints what became of the tests from `told` on that have ended, in the order of the files.
+fn tell(runs: &[Run<'_>], told: &mut usize, options: &Options) {
+    while let Some(run) = runs.get(*told) {
+        let result = run.result.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(finished) = result.as_ref() else { return };
+        if *told == 0 || !std::ptr::eq(runs[*told - 1].suite, run.suite) {
+            println!("{}", run.file());
+        }
+        print!("{}", text(run, finished, options));
+        *told += 1;
+    }
+}
+
+/// Returns the lines that say what became of a test.
+fn text(run: &Run<'_>, finished: &FinishedTest, options: &Options) -> String {
+    let Test { name, seeds, .. } = &run.test;
+    let (why, output) = match &finished.verdict {
+        Verdict::Passed if options.seed.is_none() && *seeds > 1 => {
+            return format!("  passed  {name}, {seeds} seeds\n");
+        }
+        Verdict::Passed => return format!("  passed  {name}\n"),
+        Verdict::PassedAll(how) => return format!("  passed  {name}, {how}\n"),
+        Verdict::Failed { why, output } => (why, output),
+    };
+    let seed = finished.seed.map_or(String::new(), |seed| format!(", seed {seed}"));
+    let mut text = format!("  FAILED  {name}{seed}: {why}\n");
+    // Writing to a string does not fail.
+    output.lines().for_each(|line| _ = writeln!(text, "          {line}"));
+    let again = finished.seed.map_or(String::new(), |seed| format!(" --seed {seed}"));
+    _ = writeln!(text, "          again: eslvm test {} --filter {}{again}", run.file(), quoted(name));
+    text
+}
+
+/// Returns a word as a shell reads it.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_+.,/:@%".contains(c);
+    if word.chars().all(is_plain) { word.into() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}

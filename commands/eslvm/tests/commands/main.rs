@@ -1,0 +1,86 @@
+//! The command `eslvm`, run as a process, also with programs that `eslc` compiles: exit statuses, outputs,
+//! files.
+
+#[cfg(unix)]
+mod attach;
+#[cfg(unix)]
+mod attacks;
+mod background;
+mod bad_input;
+#[cfg(unix)]
+mod browser;
+mod coverage;
+mod deadlock;
+mod documents;
+mod examples;
+mod exploring;
+mod http;
+mod http_client;
+mod http_peers;
+mod http_server;
+#[cfg(unix)]
+mod lines;
+#[cfg(target_os = "linux")]
+mod memory;
+mod missions;
+mod modules;
+mod monitor;
+#[cfg(unix)]
+mod mqtt;
+mod mqtt_messages;
+mod operate;
+#[cfg(unix)]
+mod patches;
+mod paths;
+mod peers;
+#[cfg(unix)]
+mod playground;
+mod profile;
+mod real_time;
+mod recording;
+mod replay;
+mod reports;
+mod rights;
+#[cfg(unix)]
+mod secured;
+#[cfg(unix)]
+mod slime;
+mod sockets;
+#[cfg(unix)]
+mod standing;
+mod streams;
+#[cfg(unix)]
+mod terminal;
+mod testing;
+mod timeline;
+mod traces;
+#[cfg(unix)]
+mod ways_out;
+mod world;
+
+use std::process::Command;
+
+use esl_conformance::process;
+
+const ESLVM: &str = env!("CARGO_BIN_EXE_eslvm");
+
+/// Returns the path of the command `eslc`, which is built beside `eslvm`.
+fn eslc_path() -> String {
+    process::beside(ESLVM, "eslc")
+}
+
+/// The command `eslc` with these arguments.
+fn eslc(arguments: &[&str]) -> Command {
+    process::command(&eslc_path(), arguments)
+}
+
+/// The command `eslvm` with these arguments.
+fn eslvm(arguments: &[&str]) -> Command {
+    process::command(ESLVM, arguments)
+}
+
+/// Says that a test was left out, and why.
+#[allow(clippy::print_stderr, reason = "whoever runs the tests sees what is left out")]
+fn say_left_out(reason: &str) {
+    eprintln!("left out: {reason}");
+}

@@ -1,0 +1,443 @@
+//! The file of a recorded run, `.eslj`.
+//!
+//! ```text
+//! magic           8 bytes   b"ESLJ\r\n\x1a\n"
+//! format version  u32       FORMAT
+//! frames, one after the other:
+//!   length        u32       of the content
+//!   CRC-32        u32       of the content
+//!   kind          u8        1 header, 2 records, 3 records compressed by lz4, 4 end
+//!   check         u16       low half of the CRC-32 of the nine bytes before
+//!   content
+//! ```
+//!
+//! Numbers are little-endian. The first frame is the header: what the run began with, the program included,
+//! as it is: to compress it takes longer than the beginning of a small program does.
+//! Each frame of records holds those that were made between two writes to the file. The last one is the end:
+//! how the run has ended.
+//!
+//! A run may be killed, so the last frame may be torn: then it is as if it had not been written. Anything
+//! else that is wrong means that the file was changed, and it is refused.
+//!
+//! Guarantees: no bytes make [`Recorded::read`] panic, or allocate more than a small multiple of their
+//! number; lz4 gives at most 255 bytes for one.
+
+use std::fmt;
+
+use esl::program::ExecutionIdentity;
+use esl_host::{NotedRecord, Right, RunCheck};
+use esl_vm::embed::Need;
+use esl_vm::vm::Config;
+
+use super::pack::{ByteReader, ByteWriter};
+use super::records::{self, Before};
+
+/// The first bytes of a file. They betray transfers that change line ends.
+pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
+/// The version of the format that this library reads and writes.
+pub const FORMAT: u32 = 4;
+
+/// Length of what is before the content of a frame.
+const FRAME: usize = 11;
+/// Content above this size is compressed.
+const COMPRESSED_ABOVE: usize = 4096;
+/// Most bytes that lz4 makes of one.
+const EXPANSION: usize = 255;
+
+/// Kinds of frames.
+mod kind {
+    pub(super) const HEADER: u8 = 1;
+    pub(super) const RECORDS: u8 = 2;
+    pub(super) const COMPRESSED: u8 = 3;
+    pub(super) const END: u8 = 4;
+}
+
+/// A function of the embedder's, as a replay has to know it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GivenFunction {
+    /// Its name.
+    pub name: String,
+    /// Whether it begins operations.
+    pub is_operation: bool,
+    /// The rights that it needs.
+    pub needs: Vec<Need>,
+}
+
+/// The beginning of a run.
+#[derive(Clone, Debug)]
+pub struct Beginning {
+    /// Bytes of the program, as in an `.eslb` file.
+    pub program: Vec<u8>,
+    /// Limits and settings.
+    pub config: Config,
+    /// The enabled traces.
+    pub traces: Vec<String>,
+    /// The folders in which modules are looked for.
+    pub folders: Vec<String>,
+    /// The names of the file of the program, if it was one.
+    pub program_file: Vec<String>,
+    /// The schedule by which tasks take turns, as a text, if there is one.
+    pub schedule: Option<String>,
+    /// The functions of the embedder's.
+    pub functions: Vec<GivenFunction>,
+    /// Identity of the machine and its library.
+    pub(super) identity: String,
+}
+
+/// How a run has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RecordedEnd {
+    /// Exit status.
+    pub status: u8,
+    /// Ticks and canary at the end.
+    pub check: RunCheck,
+}
+
+/// A recorded run.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    /// The beginning of the run.
+    pub beginning: Beginning,
+    /// The records.
+    pub records: std::sync::Arc<[NotedRecord]>,
+    /// How it has ended; `None` if the file ends before.
+    pub end: Option<RecordedEnd>,
+    /// Bytes of a torn frame that were left out.
+    pub torn: usize,
+}
+
+/// Why bytes are no recorded run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RecordedError {
+    /// The first bytes are not those of a recording.
+    NotOne,
+    /// It was written by another version of the format.
+    Format(u32),
+    /// It ends before the program has begun.
+    NoBeginning,
+    /// A part of it was changed, or is of an unknown kind.
+    Damaged {
+        /// Offset of the frame.
+        offset: usize,
+        /// The fault.
+        problem: &'static str,
+    },
+    /// It was made by another build of the machine or its library.
+    OtherMachine,
+}
+
+impl fmt::Display for RecordedError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RecordedError::NotOne => f.write_str("it is not a recording of a run"),
+            RecordedError::Format(version) => {
+                write!(f, "it has version {version} of the format; this machine reads version {FORMAT}")
+            }
+            RecordedError::NoBeginning => {
+                f.write_str("it ends before the program; the run was killed while it began")
+            }
+            RecordedError::Damaged { offset, problem } => {
+                write!(f, "it is damaged at byte {offset}: {problem}")
+            }
+            RecordedError::OtherMachine => f.write_str(
+                "it was made by another version of the machine or its library, in which the same run takes \
+                 another course; replay it with that version",
+            ),
+        }
+    }
+}
+
+impl std::error::Error for RecordedError {}
+
+/// Adds a frame to the bytes of a file.
+pub(super) fn frame(out: &mut Vec<u8>, kind: u8, content: &[u8]) {
+    let start = out.len();
+    // A piece of 4 GiB cannot be held by the machine either.
+    out.extend_from_slice(&u32::try_from(content.len()).unwrap_or(u32::MAX).to_le_bytes());
+    out.extend_from_slice(&crc32fast::hash(content).to_le_bytes());
+    out.push(kind);
+    let check = crc32fast::hash(&out[start..]) as u16;
+    out.extend_from_slice(&check.to_le_bytes());
+    out.extend_from_slice(content);
+}
+
+/// Returns the bytes with which a file begins.
+pub(super) fn beginning_bytes(beginning: &Beginning) -> Vec<u8> {
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend_from_slice(&FORMAT.to_le_bytes());
+    let mut out = ByteWriter::default();
+    out.text(&beginning.identity);
+    write_config(&mut out, &beginning.config);
+    out.list(&beginning.traces, |out, text| out.text(text));
+    out.list(&beginning.folders, |out, text| out.text(text));
+    out.list(&beginning.program_file, |out, text| out.text(text));
+    out.list(beginning.schedule.as_slice(), |out, text| out.text(text));
+    out.list(&beginning.functions, |out, function| {
+        out.text(&function.name);
+        out.byte(function.is_operation.into());
+        out.list(&function.needs, |out, need| {
+            out.byte(need.right as u8);
+            out.number(need.argument as u64);
+        });
+    });
+    out.bytes(&beginning.program);
+    frame(&mut bytes, kind::HEADER, &out.0);
+    bytes
+}
+
+fn read_beginning(content: &[u8]) -> Option<Beginning> {
+    let mut from = ByteReader(content);
+    let identity = from.text()?.into();
+    let config = read_config(&mut from)?;
+    let traces = from.list(|from| Some(from.text()?.into()))?;
+    let folders = from.list(|from| Some(from.text()?.into()))?;
+    let program_file = from.list(|from| Some(from.text()?.into()))?;
+    let mut schedules: Vec<String> = from.list(|from| Some(from.text()?.into()))?;
+    let schedule = schedules.pop();
+    let functions = from.list(|from| {
+        let (name, is_operation) = (from.text()?.into(), from.flag()?);
+        let needs = from.list(|from| {
+            let right = usize::from(from.byte()?);
+            let right = Right::ALL.into_iter().chain([Right::Module]).find(|&one| one as usize == right)?;
+            Some(Need { right, argument: usize::try_from(from.number()?).ok()? })
+        })?;
+        Some(GivenFunction { name, is_operation, needs })
+    })?;
+    let program = from.bytes()?.to_vec();
+    from.is_empty().then_some(Beginning {
+        program,
+        config,
+        traces,
+        folders,
+        program_file,
+        schedule,
+        functions,
+        identity,
+    })
+}
+
+fn decompress(bytes: &[u8], length: usize) -> Option<Vec<u8>> {
+    if length > bytes.len().saturating_mul(EXPANSION) {
+        return None;
+    }
+    lz4_flex::block::decompress(bytes, length).ok().filter(|content| content.len() == length)
+}
+
+fn write_config(out: &mut ByteWriter, config: &Config) {
+    let Config {
+        memory,
+        stack,
+        slice,
+        budget,
+        seed,
+        collect_always,
+        critical_ticks,
+        cleanup_ticks,
+        cleanup_time,
+        snapshots: _,
+    } = config;
+    let optional = |out: &mut ByteWriter, number: Option<u64>| {
+        out.byte(number.is_some().into());
+        out.number(number.unwrap_or(0));
+    };
+    out.number(*memory as u64);
+    optional(out, stack.map(|words| words as u64));
+    out.number(u64::from(*slice));
+    optional(out, *budget);
+    out.number(*seed);
+    out.byte((*collect_always).into());
+    out.number(u64::from(*critical_ticks));
+    out.number(*cleanup_ticks);
+    out.number(*cleanup_time);
+}
+
+fn read_config(from: &mut ByteReader<'_>) -> Option<Config> {
+    let optional = |from: &mut ByteReader<'_>| {
+        let (is_there, number) = (from.flag()?, from.number()?);
+        Some(is_there.then_some(number))
+    };
+    Some(Config {
+        memory: usize::try_from(from.number()?).ok()?,
+        stack: match optional(from)? {
+            Some(words) => Some(usize::try_from(words).ok()?),
+            None => None,
+        },
+        slice: from.small().filter(|&slice| (1..=1_000_000_000).contains(&slice))?,
+        budget: optional(from)?,
+        seed: from.number()?,
+        collect_always: from.flag()?,
+        critical_ticks: from.small()?,
+        cleanup_ticks: from.number()?,
+        cleanup_time: from.number()?,
+        snapshots: false,
+    })
+}
+
+/// Records on their way to a file.
+#[derive(Debug, Default)]
+pub(super) struct Unwritten {
+    packed: ByteWriter,
+    before: Before,
+}
+
+impl Unwritten {
+    /// Adds a record, and returns the number of bytes that wait.
+    pub(super) fn add(&mut self, noted: &NotedRecord) -> usize {
+        records::write(&mut self.packed, noted, &mut self.before);
+        self.packed.0.len()
+    }
+
+    /// Takes what waits as a frame; nothing if nothing does.
+    pub(super) fn take(&mut self) -> Vec<u8> {
+        let content = &mut self.packed.0;
+        let mut bytes = Vec::new();
+        if content.len() > COMPRESSED_ABOVE {
+            let mut out = ByteWriter::default();
+            out.number(content.len() as u64);
+            out.0.extend_from_slice(&lz4_flex::block::compress(content));
+            frame(&mut bytes, kind::COMPRESSED, &out.0);
+        } else if !content.is_empty() {
+            bytes.reserve(FRAME + content.len());
+            frame(&mut bytes, kind::RECORDS, content);
+        }
+        // Its room stays, for the next.
+        content.clear();
+        bytes
+    }
+}
+
+/// Returns the last frame.
+pub(super) fn end_bytes(end: &RecordedEnd) -> Vec<u8> {
+    let mut out = ByteWriter::default();
+    out.byte(end.status);
+    out.number(end.check.round);
+    out.number(end.check.ticks);
+    out.0.extend_from_slice(&end.check.canary.to_le_bytes());
+    let mut bytes = Vec::new();
+    frame(&mut bytes, kind::END, &out.0);
+    bytes
+}
+
+fn read_end(content: &[u8]) -> Option<RecordedEnd> {
+    let mut from = ByteReader(content);
+    let status = from.byte()?;
+    let (round, ticks) = (from.number()?, from.number()?);
+    let check = RunCheck { round, ticks, canary: u64::from_le_bytes(from.array()?) };
+    from.is_empty().then_some(RecordedEnd { status, check })
+}
+
+/// The contents at some place of a file.
+enum FoundFrame<'a> {
+    Frame(u8, &'a [u8]),
+    /// A frame whose writing was interrupted.
+    Torn,
+    Wrong(&'static str),
+}
+
+/// Looks for a frame at the beginning of `bytes`.
+fn find(bytes: &[u8]) -> FoundFrame<'_> {
+    // A system that crashes may leave zeros where nothing was written.
+    let is_unwritten = |bytes: &[u8]| bytes.iter().all(|&byte| byte == 0);
+    let Some((head, rest)) = bytes.split_first_chunk::<FRAME>() else { return FoundFrame::Torn };
+    let word = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+    let check = u16::from_le_bytes([head[9], head[10]]);
+    if crc32fast::hash(&head[..9]) as u16 != check {
+        return if is_unwritten(bytes) {
+            FoundFrame::Torn
+        } else {
+            FoundFrame::Wrong("no frame begins here")
+        };
+    }
+    let Some((content, rest)) = rest.split_at_checked(word(0) as usize) else { return FoundFrame::Torn };
+    if crc32fast::hash(content) != word(4) {
+        return if is_unwritten(rest) {
+            FoundFrame::Torn
+        } else {
+            FoundFrame::Wrong("the content has another checksum")
+        };
+    }
+    FoundFrame::Frame(head[8], content)
+}
+
+impl Recorded {
+    /// Reads the bytes of a file.
+    ///
+    /// # Errors
+    /// [`RecordedError`].
+    pub fn read(bytes: &[u8]) -> Result<Recorded, RecordedError> {
+        let Some(rest) = bytes.strip_prefix(&MAGIC) else {
+            let is_torn = MAGIC.starts_with(bytes);
+            return Err(if is_torn { RecordedError::NoBeginning } else { RecordedError::NotOne });
+        };
+        let (version, mut rest) = rest.split_first_chunk::<4>().ok_or(RecordedError::NoBeginning)?;
+        let version = u32::from_le_bytes(*version);
+        if version != FORMAT {
+            return Err(RecordedError::Format(version));
+        }
+        let (mut beginning, mut end) = (None, None);
+        let (mut records, mut before) = (Vec::new(), Before::default());
+        let mut is_ours = true;
+        while !rest.is_empty() {
+            let offset = bytes.len() - rest.len();
+            let damaged = |problem| RecordedError::Damaged { offset, problem };
+            let (kind, content) = match find(rest) {
+                FoundFrame::Frame(kind, content) => (kind, content),
+                FoundFrame::Torn => break,
+                FoundFrame::Wrong(problem) => return Err(damaged(problem)),
+            };
+            if end.is_some() || beginning.is_some() == (kind == kind::HEADER) {
+                return Err(damaged("this frame does not belong here"));
+            }
+            // Another machine may have written what this one does not know.
+            if kind == kind::HEADER {
+                is_ours = ByteReader(content).text().is_none_or(is_own);
+            }
+            let strange = |problem| if is_ours { damaged(problem) } else { RecordedError::OtherMachine };
+            let malformed = || strange("the content is not what its kind says");
+            match kind {
+                kind::HEADER => beginning = Some(read_beginning(content).ok_or_else(malformed)?),
+                kind::RECORDS => add_records(&mut records, content, &mut before).ok_or_else(malformed)?,
+                kind::COMPRESSED => {
+                    let mut from = ByteReader(content);
+                    let length = from.number().and_then(|length| usize::try_from(length).ok());
+                    let content =
+                        length.and_then(|length| decompress(from.0, length)).ok_or_else(malformed)?;
+                    add_records(&mut records, &content, &mut before).ok_or_else(malformed)?;
+                }
+                kind::END => end = Some(read_end(content).ok_or_else(malformed)?),
+                _ => return Err(strange("a frame of an unknown kind")),
+            }
+            rest = &rest[FRAME + content_length(rest)..];
+        }
+        let beginning = beginning.ok_or(RecordedError::NoBeginning)?;
+        Ok(Recorded { beginning, records: records.into(), end, torn: rest.len() })
+    }
+
+    /// Returns the last check of the records.
+    pub fn last_check(&self) -> Option<RunCheck> {
+        self.records.iter().rev().find_map(|noted| match noted.record {
+            esl_host::Record::Checked(check) => Some(check),
+            _ => None,
+        })
+    }
+}
+
+/// Returns whether an identity is that of this machine and its library.
+pub(super) fn is_own(identity: &str) -> bool {
+    identity == ExecutionIdentity::current().to_string()
+}
+
+/// Returns the length of the content of the frame at the beginning of `bytes`, which is whole.
+fn content_length(bytes: &[u8]) -> usize {
+    bytes.first_chunk().map_or(0, |length| u32::from_le_bytes(*length) as usize)
+}
+
+/// Adds the records of a frame.
+fn add_records(records: &mut Vec<NotedRecord>, content: &[u8], before: &mut Before) -> Option<()> {
+    let mut from = ByteReader(content);
+    while !from.is_empty() {
+        records.push(records::read(&mut from, before)?);
+    }
+    Some(())
+}

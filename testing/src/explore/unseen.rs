@@ -1,0 +1,332 @@
+//! The places of a program that tasks may share and that explorations at most grains do not see.
+//!
+//! A program is read, not run: each instruction and call that changes an object counts as a change of a place
+//! that tasks may share, wherever the object comes from. So a program without unseen changes has no places
+//! that tasks share but those that grain `variables` sees, and an exploration at that grain speaks of all its
+//! schedules. The converse does not hold: an object that is changed may be known to one task only.
+//!
+//! Not here: changes by functions that the program makes while it runs, which count as unseen themselves
+//! (`eval`, `compile`, `load`); what the library shares between tasks, which it protects.
+
+use std::fmt;
+
+use esl::program::Program;
+use esl_bytecode::builtin::Builtin;
+use esl_bytecode::module::{Constant, Module, ModuleFunction};
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
+
+use super::Grain;
+use super::forms::SourceForms;
+
+/// A kind of use of shared places that a grain does not see.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum UnseenKind {
+    /// Looking at what others do, which only grain `changes` does not see.
+    Read,
+    /// A change of a special variable, which grains below `variables` do not see.
+    Variable,
+    /// Of a variable that a closure shares with its surroundings.
+    Captured,
+    /// Of a slot of a structure or an instance.
+    Slot,
+    /// Of an element of an array or a string.
+    Element,
+    /// Of a pair.
+    Pair,
+    /// Of a hash table.
+    Table,
+    /// Of the properties of a symbol.
+    Property,
+    /// Of whatever code changes that is made while the program runs.
+    Code,
+}
+
+impl fmt::Display for UnseenKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            UnseenKind::Read => "data that tasks read",
+            UnseenKind::Variable => "changes of special variables",
+            UnseenKind::Captured => "changes of variables of closures",
+            UnseenKind::Slot => "changes of slots",
+            UnseenKind::Element => "changes of elements of arrays",
+            UnseenKind::Pair => "changes of pairs",
+            UnseenKind::Table => "changes of hash tables",
+            UnseenKind::Property => "changes of properties of symbols",
+            UnseenKind::Code => "what code does that is made at run time",
+        })
+    }
+}
+
+/// A kind of change, and the first place at which the program makes one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnseenChange {
+    /// The kind.
+    pub kind: UnseenKind,
+    /// The place, as `file:line:column`; `None` if the program has lost it.
+    pub place: Option<String>,
+}
+
+impl fmt::Display for UnseenChange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.place {
+            Some(place) => write!(f, "{} ({place})", self.kind),
+            None => self.kind.fmt(f),
+        }
+    }
+}
+
+/// Functions of the library that change an argument, by what they change.
+const CHANGING: &[(UnseenKind, &[&str])] = &[
+    (
+        UnseenKind::Pair,
+        &[
+            "RPLACA",
+            "RPLACD",
+            "%SET-CAR",
+            "%SET-CDR",
+            "%SET-NTH",
+            "NBUTLAST",
+            "NCONC",
+            "NRECONC",
+            "NUNION",
+            "NINTERSECTION",
+            "NSET-DIFFERENCE",
+            "NSET-EXCLUSIVE-OR",
+            "NSUBLIS",
+            "NSUBST",
+            "NSUBST-IF",
+            "NSUBST-IF-NOT",
+            "DELETE",
+            "DELETE-IF",
+            "DELETE-IF-NOT",
+            "DELETE-DUPLICATES",
+            "NSUBSTITUTE",
+            "NSUBSTITUTE-IF",
+            "NSUBSTITUTE-IF-NOT",
+            "NREVERSE",
+            "SORT",
+            "STABLE-SORT",
+            "MERGE",
+            "MAPCAN",
+            "MAPCON",
+        ],
+    ),
+    (
+        UnseenKind::Element,
+        &[
+            "%SET-ELT",
+            "%SET-SVREF",
+            "%SET-AREF",
+            "%SET-ROW-MAJOR-AREF",
+            "%SET-CHAR",
+            "%SET-FILL-POINTER",
+            "%FILL",
+            "%REPLACE",
+            "%FILL-MORE",
+            "%NSTRING-UPCASE",
+            "%NSTRING-DOWNCASE",
+            "NSTRING-UPCASE",
+            "NSTRING-DOWNCASE",
+            "NSTRING-CAPITALIZE",
+            "FILL",
+            "REPLACE",
+            "MAP-INTO",
+            "VECTOR-PUSH",
+            "VECTOR-PUSH-EXTEND",
+            "VECTOR-POP",
+            "ADJUST-ARRAY",
+            "READ-SEQUENCE",
+            "BIT-AND",
+            "BIT-IOR",
+            "BIT-XOR",
+            "BIT-NOT",
+        ],
+    ),
+    (
+        UnseenKind::Slot,
+        &[
+            "%SET-SLOT",
+            "%SET-STRUCTURE-REF",
+            "%SET-SLOT-VALUE",
+            "%SET-SLOT-VALUE-OF",
+            "SLOT-MAKUNBOUND",
+            "SHARED-INITIALIZE",
+            "REINITIALIZE-INSTANCE",
+            "CHANGE-CLASS",
+        ],
+    ),
+    (
+        UnseenKind::Table,
+        &[
+            "%PUTHASH",
+            "%ADD-TO-VALUE",
+            "REMHASH",
+            "CLRHASH",
+            "%SET-TABLE-VALUE",
+            "%TABLE-ADD",
+            "%TABLE-DELETE",
+        ],
+    ),
+    (UnseenKind::Property, &["%PUT", "%SET-PROPERTY", "REMPROP", "%SET-SYMBOL-PLIST", "%PUTF", "%REMF"]),
+    (UnseenKind::Variable, &["SET", "MAKUNBOUND"]),
+    (UnseenKind::Code, &["EVAL", "COMPILE", "LOAD"]),
+];
+
+/// Returns the kinds of changes that a program makes and that a grain does not see, each with its first
+/// place.
+pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
+    let module = program.module();
+    let sees_variables = match grain {
+        Grain::Ticks => return Vec::new(),
+        Grain::Variables => true,
+        Grain::Changes | Grain::Reads => false,
+    };
+    let mut forms = SourceForms::default();
+    let mut found: Vec<UnseenChange> = Vec::new();
+    for (number, function) in module.functions.iter().enumerate() {
+        let is_toplevel = module.toplevel.iter().any(|toplevel| toplevel.0 as usize == number);
+        for (pc, instr) in instructions(function) {
+            let Some(kind) = kind_of(module, function, instr) else { continue };
+            let place = place(module, function, pc);
+            let mut is_of = |operator| {
+                place.is_some_and(|(source, line, column)| {
+                    let source = &module.sources[source];
+                    forms.is_of(operator, source, line as usize, column as usize)
+                })
+            };
+            let is_known = match kind {
+                // A definition gives a variable its first value.
+                UnseenKind::Variable => sees_variables || is_of("defvar") || is_of("defparameter"),
+                // Definitions keep what they define at symbols, before any task can look at it.
+                UnseenKind::Property => is_toplevel,
+                // A loop appends to a list of its own.
+                UnseenKind::Pair => is_of("loop"),
+                // The calls of a slot's writer are instructions of the caller.
+                UnseenKind::Slot => is_of("defstruct"),
+                _ => false,
+            };
+            if is_known || found.iter().any(|change| change.kind == kind) {
+                continue;
+            }
+            let place =
+                place.map(|(source, line, column)| format!("{}:{line}:{column}", module.sources[source]));
+            found.push(UnseenChange { kind, place });
+        }
+    }
+    if grain == Grain::Changes {
+        found.push(UnseenChange { kind: UnseenKind::Read, place: None });
+    }
+    found.sort_by_key(|change| change.kind);
+    found
+}
+
+/// Returns the instructions of a function, each with its place in the code.
+fn instructions(function: &ModuleFunction) -> impl Iterator<Item = (usize, Instr)> + '_ {
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        let instr = Instr::decode(&function.code, at)?;
+        let pc = at;
+        at += instr.opcode().words();
+        Some((pc, instr))
+    })
+}
+
+/// Returns the kind of change that an instruction makes, if it makes one.
+fn kind_of(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<UnseenKind> {
+    let constant = |index: usize| match module.constants.get(function.constants.get(index)?.0 as usize)? {
+        Constant::Symbol(symbol) => kind_of_function(symbol),
+        _ => None,
+    };
+    let builtin =
+        |number: u32| Builtin::from_number(number).and_then(|builtin| kind_of_function(&builtin.symbol()));
+    match instr {
+        Instr::SetSymbolValue { .. } => Some(UnseenKind::Variable),
+        Instr::BoxSet { .. } | Instr::CaptureBoxSet { .. } => Some(UnseenKind::Captured),
+        Instr::SetSlot { .. } => Some(UnseenKind::Slot),
+        Instr::VectorSet { .. } | Instr::VectorSetInt { .. } | Instr::ArraySet { .. } => {
+            Some(UnseenKind::Element)
+        }
+        Instr::SetCar { .. } | Instr::SetCdr { .. } => Some(UnseenKind::Pair),
+        Instr::CallBuiltin { builtin: number, .. } | Instr::TailCallBuiltin { builtin: number, .. } => {
+            builtin(number.0)
+        }
+        Instr::CallGlobal { symbol, .. } | Instr::TailCallGlobal { symbol, .. } => {
+            constant(symbol.0 as usize)
+        }
+        Instr::FunctionRef { symbol, .. } => constant(symbol.0 as usize),
+        Instr::LoadConst { constant: index, .. } => constant(index.0 as usize),
+        _ => None,
+    }
+}
+
+/// Returns what the function of this name changes, if the library has one that changes an argument.
+fn kind_of_function(symbol: &Symbol) -> Option<UnseenKind> {
+    if !symbol.is_in(CL_PACKAGE) && !symbol.is_in(ESL_PACKAGE) {
+        return None;
+    }
+    let (kind, _) = CHANGING.iter().find(|(_, names)| names.contains(&symbol.name()))?;
+    Some(*kind)
+}
+
+/// Returns the source, line and column of an instruction.
+fn place(module: &Module, function: &ModuleFunction, pc: usize) -> Option<(usize, u32, u32)> {
+    let entry = function.lines.iter().take_while(|entry| entry.pc as usize <= pc).last()?;
+    module.sources.get(entry.source as usize).map(|_| (entry.source as usize, entry.line, entry.column))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use esl::program::{Source, compile};
+
+    fn kinds(text: &str) -> Vec<UnseenKind> {
+        let compiled = compile(&[Source::new("unseen.esl", text)]);
+        let program = compiled.program.unwrap_or_else(|| panic!("{text}: {:?}", compiled.diagnostics));
+        unseen_changes(&program, Grain::Variables).into_iter().map(|change| change.kind).collect()
+    }
+
+    #[test]
+    fn changes_are_seen_in_whatever_way_they_are_written() {
+        use UnseenKind::*;
+        let expected: &[(&str, &[UnseenKind])] = &[
+            ("(defvar *n* 0) (incf *n*) (assert '(door open)) (signal (make-event))", &[]),
+            ("(let ((n 0)) (incf n) (print (mapcar #'1+ (list n))))", &[]),
+            ("(let ((n 0)) (task-net (a (incf n)) (b (incf n))))", &[Captured]),
+            ("(defstruct point x) (defvar *p* (make-point)) (setf (point-x *p*) 1)", &[Slot]),
+            ("(defclass tank () ((level))) (setf (slot-value (make-instance 'tank) 'level) 1)", &[Slot]),
+            ("(defvar *v* (vector 1)) (setf (svref *v* 0) 2)", &[Element]),
+            ("(defvar *v* (make-array 1)) (setf (aref *v* 0) 2)", &[Element]),
+            ("(defvar *v* (make-array '(1 1))) (setf (aref *v* 0 0) 2)", &[Element]),
+            ("(defvar *s* (copy-seq \"abc\")) (setf (char *s* 0) #\\z)", &[Element]),
+            ("(defvar *l* (list 1)) (setf (car *l*) 2)", &[Pair]),
+            ("(defvar *l* (list 1)) (push 2 (cdr *l*))", &[Pair]),
+            ("(defvar *l* (list 1)) (setf (nth 0 *l*) 2)", &[Pair]),
+            ("(defvar *l* (list 1)) (print (funcall 'sort *l* #'<))", &[Pair]),
+            ("(defvar *h* (make-hash-table)) (setf (gethash 1 *h*) 2)", &[Table]),
+            ("(defvar *h* (make-hash-table)) (incf (gethash 1 *h* 0))", &[Table]),
+            ("(defvar *h* (make-hash-table)) (remhash 1 *h*)", &[Table]),
+            ("(defun note () (setf (get 'robot 'state) 1)) (note)", &[Property]),
+            ("(eval (list 'print 1))", &[Code]),
+        ];
+        for (text, expected) in expected {
+            assert_eq!(kinds(text), *expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_grain_sees_what_coarser_ones_do_not() {
+        let compiled = compile(&[Source::new("unseen.esl", "(defvar *n*) (defun note () (setq *n* 1))")]);
+        let program = compiled.program.expect("it compiles");
+        let text = |grain| {
+            let found = unseen_changes(&program, grain);
+            found.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+        };
+        assert_eq!(
+            text(Grain::Changes),
+            "data that tasks read, changes of special variables (unseen.esl:1:29)"
+        );
+        assert_eq!(text(Grain::Reads), "changes of special variables (unseen.esl:1:29)");
+        assert_eq!((text(Grain::Variables), text(Grain::Ticks)), (String::new(), String::new()));
+    }
+}
