@@ -3,7 +3,7 @@
 //!
 //! The names of parameters in [`crate::builtin`] are words for kinds: a parameter called `number` takes a
 //! number. So the compiler can tell from the table that `(+ 1 "2")` fails. A kind refuses a constant only
-//! if every builtin with such a parameter does; `conformance/tests/constants.rs` calls each of them with
+//! if every builtin with such a parameter does; `conformance/tests/language/constants.rs` calls each of them with
 //! each refused constant.
 
 use crate::datum::DatumKind;

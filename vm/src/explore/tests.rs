@@ -1,5 +1,5 @@
 //! Exploration of programs assembled by hand, and its parts. Programs in ESL are explored in
-//! `conformance/tests/explore.rs`.
+//! `conformance/tests/language/explore`.
 
 use std::convert::Infallible;
 

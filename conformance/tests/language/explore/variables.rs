@@ -2,7 +2,7 @@
 
 use esl_testing::explore::Grain;
 
-use crate::{check, endings, outputs};
+use super::{check, endings, outputs};
 
 /// A variable, and changes of it with a call in between, before which the machine may preempt.
 const SETUP: &str = "(defvar *n* 0) (defun one-more (n) (+ n 1))

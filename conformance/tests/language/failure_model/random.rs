@@ -1,6 +1,6 @@
 //! Random forms.
 
-use crate::form::*;
+use super::form::*;
 
 /// Source of random forms.
 pub(crate) struct Random(pub(crate) u64);

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::fmt::Write;
 use std::rc::Rc;
 
-use crate::form::*;
+use super::form::*;
 
 /// Returns the expected output of a program; `None` if it takes too long.
 pub(crate) fn expectation(form: &Form) -> Option<String> {

@@ -6,8 +6,8 @@ use esl::program::Ended;
 use esl_testing::explore::{Grain, Settings, explore_with};
 use esl_vm::vm::Vm;
 
-use crate::putting_back::{TextChange, changed_functions};
-use crate::{POWER, TWO_TASKS_ENDINGS, check, compile, two_tasks};
+use super::putting_back::{TextChange, changed_functions};
+use super::{POWER, TWO_TASKS_ENDINGS, check, compile, two_tasks};
 
 /// Functions of the programs: holding the lock of a property, and counting the locks.
 const HOLD: &str = "

@@ -5,7 +5,7 @@
 //! form that was suspended and resumed ends as without. Forms with several bodies are suspended in
 //! `composition` and `keeping`.
 
-use crate::composition::{NOTHING, check_bodies};
+use super::composition::{NOTHING, check_bodies};
 
 /// Returns the beginning of the programs. `others` runs beside a form, and ends by itself.
 fn setup(others: &str) -> String {

@@ -1,7 +1,7 @@
 //! Forms that keep something so, under all schedules: supervisors, watchers and quotas, with an abort, a
 //! failure or a suspension at every point.
 
-use crate::composition::{NOTHING, check_bodies};
+use super::composition::{NOTHING, check_bodies};
 
 // ---- supervision
 

@@ -3,7 +3,7 @@
 
 use esl_testing::explore::Grain;
 
-use crate::check;
+use super::check;
 
 /// `left` counts the remaining suspensions; `go-on` is a step that others can see.
 const LEFT: &str = "

@@ -3,7 +3,7 @@
 
 use esl_testing::explore::Grain;
 
-use crate::check;
+use super::check;
 
 /// A body with a cleanup, and what is left of all of them: bodies that are open, tasks, claims, watches,
 /// suspensions.

@@ -2,7 +2,7 @@
 
 use esl_testing::explore::Grain;
 
-use crate::check;
+use super::check;
 
 #[test]
 fn a_change_is_seen_wherever_it_comes() {

@@ -3,7 +3,7 @@
 
 use esl_testing::explore::Grain;
 
-use crate::check;
+use super::check;
 
 /// Two resources, and what is held of them and waited for.
 const RESOURCES: &str = "
