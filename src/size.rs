@@ -1,4 +1,12 @@
 //! Sizes in bytes, as they are written on a command line.
+//!
+//! ```
+//! use esl::size::{SizeError, parse_size, parse_stack};
+//!
+//! assert_eq!(parse_size("64M"), Ok(64 << 20));
+//! assert_eq!(parse_stack("128k"), Ok(128 << 10));
+//! assert_eq!(parse_size("1M"), Err(SizeError::TooSmall));
+//! ```
 
 use std::fmt;
 

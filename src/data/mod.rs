@@ -27,6 +27,14 @@ pub use structure::{Structure, StructureError};
 pub use opaque::{HostType, Opaque};
 
 /// A value from a program, or for one.
+///
+/// ```
+/// use esl::Data;
+///
+/// let order = Data::list([Data::Symbol("GO".into()), 7.into(), "home".into()]);
+/// assert_eq!(order.to_string(), "(GO 7 \"home\")");
+/// assert_eq!(order.as_list().and_then(|items| items[1].as_integer()), Some(7));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Data {
     /// `NIL`: false, and the empty list.
@@ -169,6 +177,30 @@ impl Data {
 }
 
 /// A type of Rust that arguments of functions of the embedder's can have.
+///
+/// ```
+/// use esl::data::FromData;
+/// use esl::{Data, Engine};
+///
+/// /// A length of the program's, which counts in metres.
+/// struct Centimetres(f64);
+///
+/// impl FromData for Centimetres {
+///     const TYPE: &'static str = "REAL";
+///
+///     fn from_data(data: &Data) -> Option<Centimetres> {
+///         f64::from_data(data).map(|metres| Centimetres(100.0 * metres))
+///     }
+/// }
+///
+/// let mut engine = Engine::new()?;
+/// engine.define("STEPS", "(length)", "The steps that a length takes.", |call| {
+///     let Centimetres(length) = call.get("length")?;
+///     Ok((length / 5.0) as i64)
+/// })?;
+/// assert_eq!(engine.eval("(steps 2.5)")?.as_integer(), Some(50));
+/// # Ok::<(), esl::Error>(())
+/// ```
 pub trait FromData: Sized {
     /// Name of the type in `COMMON-LISP`, for failures.
     const TYPE: &'static str;

@@ -72,6 +72,19 @@ impl From<&str> for Failure {
 }
 
 /// A call of a function of the embedder's, with its arguments.
+///
+/// ```
+/// use esl::Engine;
+///
+/// let mut engine = Engine::new()?;
+/// engine.define("DRIVE", "(goal &optional speed)", "Drives to a goal.", |call| {
+///     let goal: String = call.get("goal")?;
+///     let speed: Option<f64> = call.get("speed")?;
+///     Ok(format!("{goal} at {}", speed.unwrap_or(0.5)))
+/// })?;
+/// assert_eq!(engine.eval("(drive \"ridge\")")?.as_str(), Some("ridge at 0.5"));
+/// # Ok::<(), esl::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Call {
     /// Variables of the lambda list, in order and in lower case.

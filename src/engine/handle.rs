@@ -172,6 +172,17 @@ pub(super) fn data(arguments: impl IntoIterator<Item = Data>) -> Vec<Datum> {
 
 /// An answer to come from a run: a future, which can also be waited for. Dropping it changes nothing in the
 /// run.
+///
+/// ```
+/// use esl::Engine;
+///
+/// let mut engine = Engine::new()?;
+/// let sum = engine.begin("(+ 1 2)");
+/// assert!(sum.take().is_none(), "nothing has run");
+/// engine.run();
+/// assert_eq!(sum.wait()?.as_integer(), Some(3));
+/// # Ok::<(), esl::Error>(())
+/// ```
 pub struct Reply<T> {
     pending: Pending,
     read: fn(Answer) -> Result<T, Error>,
@@ -250,6 +261,18 @@ fn read_tasks(answer: Answer) -> Result<Vec<TaskInfo>, Error> {
 }
 
 /// A task that was started from outside.
+///
+/// ```
+/// use esl::{Engine, Error};
+///
+/// let mut engine = Engine::new()?;
+/// engine.eval("(defun patrol () (loop (sleep 0.01)))")?;
+/// let patrol = engine.handle().spawn("patrol", []);
+/// patrol.abort();
+/// engine.run();
+/// assert_eq!(patrol.wait(), Err(Error::Aborted));
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Debug)]
 pub struct TaskHandle {
     sender: Sender,

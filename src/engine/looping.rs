@@ -17,6 +17,16 @@ use crate::data::Data;
 const PORTION: u64 = 100_000;
 
 /// Why a run is over, for now: later evaluations and calls begin another one.
+///
+/// ```
+/// use esl::Engine;
+/// use esl::engine::Ending;
+///
+/// let mut engine = Engine::new()?;
+/// engine.begin("(spawn (sleep 0.01) (exit 3))");
+/// assert_eq!(engine.run(), Ending::Exited(3));
+/// # Ok::<(), esl::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Ending {

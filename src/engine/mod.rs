@@ -49,6 +49,15 @@ pub use operation::Operation;
 /// A machine with the library. Definitions last from one evaluation to the next.
 ///
 /// An engine belongs to one thread at a time and can be sent to another; engines share nothing.
+///
+/// ```
+/// use esl::Engine;
+///
+/// let mut engine = Engine::new()?;
+/// engine.eval("(defun twice (n) (* 2 n))")?;
+/// assert_eq!(engine.eval("(twice 21)")?.as_integer(), Some(42));
+/// # Ok::<(), esl::Error>(())
+/// ```
 pub struct Engine {
     machine: Vm,
     ticks: u64,

@@ -15,6 +15,15 @@ use crate::error::Error;
 use crate::module_path::ModulePath;
 
 /// Result of a compilation.
+///
+/// ```
+/// use esl::program::{Source, compile};
+///
+/// let compiled = compile(&[Source::new("door.esl", "(print (undefined-door))\n(let 5)")]);
+/// assert!(compiled.has_errors() && compiled.program.is_none());
+/// let codes: Vec<&str> = compiled.diagnostics.iter().map(|diagnostic| diagnostic.code).collect();
+/// assert!(codes.contains(&"malformed-binding"));
+/// ```
 #[derive(Debug)]
 pub struct Compiled {
     /// Program, unless there was an error.

@@ -9,6 +9,13 @@ pub use esl_vm::EXECUTION_EPOCH;
 
 /// Identity of all that decides a run beside the program, its seed and what comes from outside. A record of a
 /// run is of use only to an executable of the same identity.
+///
+/// ```
+/// use esl::program::ExecutionIdentity;
+///
+/// let identity = ExecutionIdentity::current();
+/// assert!(identity.to_string().starts_with(&format!("{}-", identity.epoch)));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExecutionIdentity {
     /// Epoch of the machine's behaviour: what its tables do not say, such as the ticks that builtins charge.

@@ -58,6 +58,16 @@ impl Source {
 }
 
 /// A compiled program.
+///
+/// ```
+/// use esl::program::{Program, Source, compile};
+///
+/// let program = compile(&[Source::new("one.esl", "(print 1)")]).program.expect("it compiles");
+/// let bytes = program.to_bytes()?;
+/// assert_eq!(Program::from_bytes(&bytes)?.disassemble(), program.disassemble());
+/// assert!(Program::from_bytes(&bytes[..bytes.len() - 1]).is_err(), "it was cut off");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Program {
     module: Module,

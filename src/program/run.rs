@@ -67,6 +67,17 @@ impl Ended {
 }
 
 /// Figures of a run.
+///
+/// ```
+/// use esl::Config;
+/// use esl::host::VirtualHost;
+/// use esl::program::{Ended, Source, compile, run};
+///
+/// let program = compile(&[Source::new("two.esl", "(spawn (sleep 1))")]).program.expect("it compiles");
+/// let summary = run(&program, Config::default(), Box::new(VirtualHost::new()))?;
+/// assert_eq!((summary.ended, summary.tasks), (Ended::Normally(0), 2));
+/// # Ok::<(), esl::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Summary {
     /// Way in which the run ended.
