@@ -147,7 +147,7 @@ impl Operands<'_> {
 
 macro_rules! define_assembler {
     ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
-        { $( $field:ident : $ty:ident ),* } ; )*) => {
+        { $( $field:ident : $ty:ident ),* } $( , $slow:ident $half:path )? ; )*) => {
         fn opcode(mnemonic: &str) -> Option<Opcode> {
             match mnemonic {
                 $( $mnemonic => Some(Opcode::$name), )*

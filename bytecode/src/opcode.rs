@@ -29,6 +29,11 @@
 //!
 //! After `value`, `test` or `effect` stands the [`Builtin`] that the instruction is, if it is one: applied to
 //! the registers that it reads and its integers, in their order, that does the same, failures included.
+//!
+//! The *slow half* of an instruction is the work that the fast path of its arm leaves over, and that machine
+//! code leaves to the machine. After the operands, the row names the function for it, a path below
+//! `esl_vm::interp`; [`SlowHalf`] explains the word before the path. A row without one that names a builtin
+//! has the builtin as its slow half. Any other row without one has none: its arm is the whole instruction.
 
 use std::fmt;
 
@@ -54,13 +59,15 @@ macro_rules! for_each_opcode {
 
             // ---- arithmetic
             /// `R[dst] := R[left] + R[right]`
-            Add = 0x08, "add", value Add { dst: Dst, left: Reg, right: Reg };
+            Add = 0x08, "add", value Add { dst: Dst, left: Reg, right: Reg }, first double::mixed_add;
             /// `R[dst] := R[left] - R[right]`
-            Sub = 0x09, "sub", value Subtract { dst: Dst, left: Reg, right: Reg };
+            Sub = 0x09, "sub", value Subtract
+                { dst: Dst, left: Reg, right: Reg }, first double::mixed_subtract;
             /// `R[dst] := R[left] * R[right]`
-            Mul = 0x0A, "mul", value Multiply { dst: Dst, left: Reg, right: Reg };
+            Mul = 0x0A, "mul", value Multiply
+                { dst: Dst, left: Reg, right: Reg }, first double::mixed_multiply;
             /// `R[dst] := R[left] / R[right]`
-            Div = 0x0B, "div", value Divide { dst: Dst, left: Reg, right: Reg };
+            Div = 0x0B, "div", value Divide { dst: Dst, left: Reg, right: Reg }, first double::mixed_divide;
             /// `R[dst] := R[left] + value`
             AddInt = 0x0C, "add-int", value Add { dst: Dst, left: Reg, value: Int8 };
             /// `R[dst]` := the quotient of `R[left]` by `R[right]`, rounded towards minus infinity
@@ -86,7 +93,7 @@ macro_rules! for_each_opcode {
             /// `R[dst] := (eq R[left] R[right])`
             Eq = 0x19, "eq", silent { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := (eql R[left] R[right])`
-            Eql = 0x1A, "eql", silent { dst: Dst, left: Reg, right: Reg };
+            Eql = 0x1A, "eql", silent { dst: Dst, left: Reg, right: Reg }, gives cold::eql;
             /// `R[dst] := (= R[left] R[right])`
             NumEq = 0x1B, "num-eq", value NumEqual { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := (< R[left] R[right])`
@@ -96,7 +103,7 @@ macro_rules! for_each_opcode {
             /// `R[dst] := (char= R[left] R[right])`
             CharEq = 0x1F, "char-eq", value CharEqualExactly { dst: Dst, left: Reg, right: Reg };
             /// `R[dst]` := whether `R[src]` is of the type
-            IsType = 0x1E, "is-type", silent { dst: Dst, src: Reg, code: TypeIdx };
+            IsType = 0x1E, "is-type", silent { dst: Dst, src: Reg, code: TypeIdx }, gives cold::is_type;
 
             // ---- jumps forward
             /// Jumps.
@@ -116,17 +123,22 @@ macro_rules! for_each_opcode {
             /// Jumps unless `(eq R[left] R[right])`.
             JumpNotEq = 0x27, "jump-not-eq", silent { left: Reg, right: Reg, to: Jump };
             /// Jumps if `(eql R[left] R[right])`.
-            JumpEql = 0x28, "jump-eql", silent { left: Reg, right: Reg, to: Jump };
+            JumpEql = 0x28, "jump-eql", silent { left: Reg, right: Reg, to: Jump }, jumps cold::jump_eql;
             /// Jumps unless `(eql R[left] R[right])`.
-            JumpNotEql = 0x29, "jump-not-eql", silent { left: Reg, right: Reg, to: Jump };
+            JumpNotEql = 0x29, "jump-not-eql", silent
+                { left: Reg, right: Reg, to: Jump }, stays cold::jump_eql;
             /// Jumps if `(eql R[left] K[constant])`.
-            JumpEqlConst = 0x2A, "jump-eql-const", silent { left: Reg, constant: ConstIdx, to: Jump };
+            JumpEqlConst = 0x2A, "jump-eql-const", silent
+                { left: Reg, constant: ConstIdx, to: Jump }, jumps cold::jump_eql_const;
             /// Jumps unless `(eql R[left] K[constant])`.
-            JumpNotEqlConst = 0x2B, "jump-not-eql-const", silent { left: Reg, constant: ConstIdx, to: Jump };
+            JumpNotEqlConst = 0x2B, "jump-not-eql-const", silent
+                { left: Reg, constant: ConstIdx, to: Jump }, stays cold::jump_eql_const;
             /// Jumps if `R[test]` is of the type.
-            JumpIfType = 0x2C, "jump-if-type", silent { test: Reg, code: TypeIdx, to: Jump };
+            JumpIfType = 0x2C, "jump-if-type", silent
+                { test: Reg, code: TypeIdx, to: Jump }, jumps cold::jump_if_type;
             /// Jumps unless `R[test]` is of the type.
-            JumpIfNotType = 0x2D, "jump-if-not-type", silent { test: Reg, code: TypeIdx, to: Jump };
+            JumpIfNotType = 0x2D, "jump-if-not-type", silent
+                { test: Reg, code: TypeIdx, to: Jump }, stays cold::jump_if_type;
             /// Jumps if `(= R[left] R[right])`.
             JumpNumEq = 0x30, "jump-num-eq", test NumEqual { left: Reg, right: Reg, to: Jump };
             /// Jumps unless `(= R[left] R[right])`.
@@ -169,7 +181,8 @@ macro_rules! for_each_opcode {
             LoopNotLess = 0x45, "loop-not-less", test_not Less { left: Reg, right: Reg, to: Back };
             /// `R[counter] := R[counter] + step`, then jumps back if `(< R[counter] R[limit])`. The addition,
             /// and with it the instruction, has no effect if either is no real number.
-            LoopCount = 0x46, "loop-count", test { counter: Reg, limit: Reg, step: Int8, to: Back };
+            LoopCount = 0x46, "loop-count", test
+                { counter: Reg, limit: Reg, step: Int8, to: Back }, test cold::loop_count;
 
             // ---- lists
             /// `R[dst] := (cons R[car] R[cdr])`
@@ -187,7 +200,7 @@ macro_rules! for_each_opcode {
             /// The cdr of the pair `R[pair]` becomes `R[value]`.
             SetCdr = 0x4E, "set-cdr", effect SetCdr { pair: Reg, value: Reg };
             /// `R[dst]` := a fresh list of `R[first], … R[first+count-1]`
-            List = 0x4F, "list", value { dst: Dst, first: Items, count: Count };
+            List = 0x4F, "list", value { dst: Dst, first: Items, count: Count }, does cold::list;
 
             // ---- vectors and structures
             /// `R[dst] := (svref R[vector] R[index])`
@@ -206,23 +219,26 @@ macro_rules! for_each_opcode {
             CharRef = 0x57, "char-ref", value Char { dst: Dst, string: Reg, index: Reg };
             /// `R[dst]` := slot `slot` of `R[instance]`, which must be an instance of the class or a
             /// subclass.
-            Slot = 0x54, "slot", value { dst: Dst, instance: Reg, slot: Index, class: WideClassIdx };
+            Slot = 0x54, "slot", value
+                { dst: Dst, instance: Reg, slot: Index, class: WideClassIdx }, rest cold::slot;
             /// Slot `slot` of `R[instance]` becomes `R[value]`.
             SetSlot = 0x55, "set-slot", effect
-                { instance: Reg, slot: Index, value: Reg, class: WideClassIdx };
+                { instance: Reg, slot: Index, value: Reg, class: WideClassIdx }, rest cold::set_slot;
             /// Jumps unless `R[test]` is an instance of the class or a subclass.
-            JumpIfNotInstance = 0x56, "jump-if-not-instance", silent { test: Reg, class: ClassIdx, to: Jump };
+            JumpIfNotInstance = 0x56, "jump-if-not-instance", silent
+                { test: Reg, class: ClassIdx, to: Jump }, stays cold::jump_if_instance;
 
             // ---- variables
             /// `R[dst]` := a fresh box that holds `R[src]`
-            MakeBox = 0x58, "make-box", never { dst: Dst, src: Reg };
+            MakeBox = 0x58, "make-box", never { dst: Dst, src: Reg }, does cold::make_box;
             /// `R[dst]` := what the box `R[cell]` holds. The box must have been made by `make-box`.
             BoxRef = 0x59, "box-ref", silent { dst: Dst, cell: Reg };
             /// The box `R[cell]` holds `R[src]`.
             BoxSet = 0x5A, "box-set", silent { cell: Reg, src: Reg };
             /// `R[dst]` := a closure of `K[function]`, whose captures are taken as that function declares
             /// them
-            MakeClosure = 0x5B, "make-closure", never { dst: Dst, function: FunctionIdx };
+            MakeClosure = 0x5B, "make-closure", never
+                { dst: Dst, function: FunctionIdx }, rest cold::make_closure;
             /// Capture `index` of the closure `R[closure]`, made by `make-closure` in this frame, becomes
             /// `R[src]`. The closure's function declares that capture as one that comes later.
             PatchCapture = 0x5C, "patch-capture", silent { closure: Reg, index: Index, src: Reg };
@@ -233,19 +249,22 @@ macro_rules! for_each_opcode {
             /// The box that is capture `index` of the running function holds `R[src]`.
             CaptureBoxSet = 0x5F, "capture-box-set", silent { src: Reg, index: Index };
             /// `R[dst]` := the value of the special variable `K[symbol]`
-            SymbolValue = 0x60, "symbol-value", value { dst: Dst, symbol: SymbolIdx };
+            SymbolValue = 0x60, "symbol-value", value
+                { dst: Dst, symbol: SymbolIdx }, rest variable::symbol_value;
             /// The special variable `K[symbol]` becomes `R[src]`.
-            SetSymbolValue = 0x61, "set-symbol-value", effect { src: Reg, symbol: SymbolIdx };
+            SetSymbolValue = 0x61, "set-symbol-value", effect
+                { src: Reg, symbol: SymbolIdx }, rest variable::set_symbol_value;
             /// Binds the special variable `K[symbol]` to `R[src]`.
-            Bind = 0x62, "bind", never { src: Reg, symbol: SymbolIdx };
+            Bind = 0x62, "bind", never { src: Reg, symbol: SymbolIdx }, does variable::bind;
             /// Undoes the newest `count` bindings of this frame.
-            Unbind = 0x63, "unbind", silent { count: Count };
+            Unbind = 0x63, "unbind", silent { count: Count }, does variable::unbind;
             /// Binds the symbols of the list `R[symbols]` to the items of `R[values]`, missing ones to
             /// nothing. The innermost control entry must be a scope of this frame; popping it undoes the
             /// bindings.
-            BindList = 0x64, "bind-list", effect { symbols: Reg, values: Reg };
+            BindList = 0x64, "bind-list", effect { symbols: Reg, values: Reg }, does unwind::bind_list;
             /// `R[dst]` := the global function named `K[symbol]`
-            FunctionRef = 0x65, "function-ref", value { dst: Dst, symbol: SymbolIdx };
+            FunctionRef = 0x65, "function-ref", value
+                { dst: Dst, symbol: SymbolIdx }, does variable::function_ref;
 
             // ---- calls: a window is the callee (or room for it), a link word, then the arguments
             /// Calls the function (or function named by the symbol) `R[window]` with `R[window+2] …`.
@@ -273,57 +292,64 @@ macro_rules! for_each_opcode {
             /// Returns `R[src]`.
             Return = 0x71, "return", return { src: Reg };
             /// Returns `R[first], … R[first+count-1]` as multiple values.
-            ReturnValues = 0x72, "return-values", return { first: Items, count: Count };
+            ReturnValues = 0x72, "return-values", return
+                { first: Items, count: Count }, quiet cold::set_values;
             /// Returns the value list.
             ReturnAll = 0x73, "return-all", return {};
 
             // ---- the value list: where all values of a form are kept
             /// The value list := `R[first], … R[first+count-1]`
-            SetValues = 0x74, "set-values", silent { first: Items, count: Count };
+            SetValues = 0x74, "set-values", silent { first: Items, count: Count }, does cold::set_values;
             /// `R[first], … R[first+count-1]` := the value list, missing values `NIL`
-            GetValues = 0x75, "get-values", silent { first: Room, count: Count };
+            GetValues = 0x75, "get-values", silent { first: Room, count: Count }, does cold::get_values;
             /// `R[dst]` := a fresh list of the value list
-            ValuesToList = 0x76, "values-to-list", value { dst: Dst };
+            ValuesToList = 0x76, "values-to-list", value { dst: Dst }, does cold::values_to_list;
             /// The value list := the items of the list `R[src]`
-            ListToValues = 0x77, "list-to-values", effect { src: Reg };
+            ListToValues = 0x77, "list-to-values", effect { src: Reg }, does cold::list_to_values;
 
             // ---- the control stack. While an entry stands, registers below its `window` keep their values.
             /// `R[dst]` := a fresh tag, equal only to itself, for `push-catch`
-            NewTag = 0x78, "new-tag", value { dst: Dst };
+            NewTag = 0x78, "new-tag", value { dst: Dst }, does unwind::new_tag;
             /// Pushes a catch for the tag `R[tag]`: a throw to it pops it, delivers its values to the window,
             /// and goes on at `to`.
-            PushCatch = 0x79, "push-catch", never { window: Window, tag: Reg, want: Want, to: Landing };
+            PushCatch = 0x79, "push-catch", never
+                { window: Window, tag: Reg, want: Want, to: Landing }, does unwind::push_catch;
             /// Pushes a cleanup: when an unwinding passes, the code at `to` runs until `end-cleanup`.
-            PushCleanup = 0x7A, "push-cleanup", never { window: Window, to: Landing };
+            PushCleanup = 0x7A, "push-cleanup", never
+                { window: Window, to: Landing }, does unwind::push_cleanup;
             /// Pushes handlers: for each type of the vector `K[types]`, a case. When one takes a condition,
             /// the entry is popped, `R[window]` is the index of the case, `R[window+1]` the condition, and
             /// control goes to `to`.
-            PushHandlerCase = 0x7B, "push-handler-case", never { window: Window, types: VectorIdx, to: Landing };
+            PushHandlerCase = 0x7B, "push-handler-case", never
+                { window: Window, types: VectorIdx, to: Landing }, does unwind::push_handler_case;
             /// Pushes recovery procedures. `R[state]` is their table, a vector, or what the machine has made
             /// of it. A throw to `R[state]` pops them, delivers two values to the window, and goes on at
             /// `to`, where the function that runs the clauses is made: the machine makes it there when a
             /// failure needs it first.
-            PushRecovery = 0x84, "push-recovery", never { window: Window, state: Reg, to: Landing };
+            PushRecovery = 0x84, "push-recovery", never
+                { window: Window, state: Reg, to: Landing }, does unwind::push_recovery;
             /// Pushes a cleanup for failures: when a failure, an abort or an expired limit leaves, the code
             /// at `to` runs until `end-cleanup`. After a failure the value list is then that failure and what
             /// is known about it.
-            PushFailureCleanup = 0x85, "push-failure-cleanup", never { window: Window, to: Landing };
+            PushFailureCleanup = 0x85, "push-failure-cleanup", never
+                { window: Window, to: Landing }, does unwind::push_failure_cleanup;
             /// Pushes handlers that run at the point of signalling: `R[handlers]` is a list of `(type .
             /// function)`.
-            PushHandlers = 0x7C, "push-handlers", never { window: Window, handlers: Reg };
+            PushHandlers = 0x7C, "push-handlers", never
+                { window: Window, handlers: Reg }, does unwind::push_handlers;
             /// Pushes a mask: entries from the fixnum `R[from]` on (a height of the control stack) are not
             /// searched.
-            PushMask = 0x7D, "push-mask", never { window: Window, from: Reg };
+            PushMask = 0x7D, "push-mask", never { window: Window, from: Reg }, does unwind::push_mask;
             /// Pushes a scope for `bind-list`.
-            PushScope = 0x7E, "push-scope", never { window: Window };
+            PushScope = 0x7E, "push-scope", never { window: Window }, does unwind::push_scope;
             /// Pops the newest `count` entries, and undoes bindings made since the oldest of them.
-            PopControl = 0x7F, "pop-control", silent { count: Count };
+            PopControl = 0x7F, "pop-control", silent { count: Count }, does unwind::pop;
             /// Ends the protected part in the normal way: the cleanup entry on top becomes a running cleanup,
             /// and control falls through into its code. The value list is kept until `end-cleanup`.
-            EnterCleanup = 0x80, "enter-cleanup", silent {};
+            EnterCleanup = 0x80, "enter-cleanup", silent {}, does unwind::enter_cleanup;
             /// Ends a cleanup: goes on with what it interrupted, or with the next instruction after
             /// `enter-cleanup`.
-            EndCleanup = 0x81, "end-cleanup", silent {};
+            EndCleanup = 0x81, "end-cleanup", silent {}, does unwind::end_cleanup;
             /// Throws the value list to the catch for the tag `R[tag]`. Fails with `control-error`, nothing
             /// unwound, when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2
             /// `go`. Then the value list is what a recovery gave.
@@ -331,7 +357,7 @@ macro_rules! for_each_opcode {
 
             // ---- counting
             /// Counts that control passes the place with this number, if the machine is asked to. Not a tick.
-            Pass = 0x86, "pass", silent { place: PassIdx };
+            Pass = 0x86, "pass", silent { place: PassIdx }, quiet cold::pass;
         }
     };
 }
@@ -371,6 +397,34 @@ impl Substitute {
             Substitute::Never => "never",
         }
     }
+}
+
+/// The kind of function that does the slow half of an instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SlowHalf {
+    /// There is no such function: the arm is the whole instruction.
+    None,
+    /// The builtin that the row names does what the fast path of the arm leaves over.
+    Builtin,
+    /// `first`: as [`SlowHalf::Builtin`], after the function has been tried with the two operands. The
+    /// function returns the value, or `UNBOUND` for operands that it leaves to the builtin. It asks for no
+    /// safepoint.
+    First,
+    /// `does`: the function does the whole instruction. It may fail, charge the task and ask for a safepoint.
+    Does,
+    /// `rest`: as `does`, for what the fast path of the arm leaves over.
+    Rest,
+    /// `quiet`: as `does`, for a function that never fails, charges nothing and asks for nothing. Of a
+    /// `return` it does all that comes before the return.
+    Quiet,
+    /// `gives`: as `quiet`, for a function that returns the value of the first operand.
+    Gives,
+    /// `jumps`: as `quiet`, for a function that returns whether the instruction jumps.
+    Jumps,
+    /// `stays`: as `jumps`, for a function that returns whether the instruction does not jump.
+    Stays,
+    /// `test`: as `rest`, for a function that returns whether a test holds.
+    Test,
 }
 
 /// Function that an instruction calls.
@@ -439,6 +493,40 @@ macro_rules! substitute {
     (never) => {
         Substitute::Never
     };
+}
+
+macro_rules! slow_half {
+    ([$($kind:ident)+] first) => {
+        SlowHalf::First
+    };
+    ([$($kind:ident)+] does) => {
+        SlowHalf::Does
+    };
+    ([$($kind:ident)+] rest) => {
+        SlowHalf::Rest
+    };
+    ([$($kind:ident)+] quiet) => {
+        SlowHalf::Quiet
+    };
+    ([$($kind:ident)+] gives) => {
+        SlowHalf::Gives
+    };
+    ([$($kind:ident)+] jumps) => {
+        SlowHalf::Jumps
+    };
+    ([$($kind:ident)+] stays) => {
+        SlowHalf::Stays
+    };
+    ([$($kind:ident)+] test) => {
+        SlowHalf::Test
+    };
+    ([$($kind:ident)+]) => {
+        if names_builtin(builtin!($($kind)+)) { SlowHalf::Builtin } else { SlowHalf::None }
+    };
+}
+
+const fn names_builtin(builtin: Option<Builtin>) -> bool {
+    builtin.is_some()
 }
 
 macro_rules! falls_through {
@@ -559,6 +647,8 @@ pub struct OpcodeInfo {
     pub callee: Option<CallTarget>,
     /// The builtin that it is, if it is one.
     pub builtin: Option<Builtin>,
+    /// The kind of function that does its slow half.
+    pub slow_half: SlowHalf,
     /// Name and type of each operand, in order.
     pub operands: &'static [(&'static str, &'static str)],
     /// Effect of the instruction.
@@ -567,7 +657,7 @@ pub struct OpcodeInfo {
 
 macro_rules! define_opcodes {
     ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
-        { $( $field:ident : $ty:ident ),* } ; )*) => {
+        { $( $field:ident : $ty:ident ),* } $( , $slow:ident $half:path )? ; )*) => {
         /// The number of an instruction.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u8)]
@@ -590,6 +680,7 @@ macro_rules! define_opcodes {
                 substitute: substitute!($($kind)+),
                 callee: callee!($($kind)+),
                 builtin: builtin!($($kind)+),
+                slow_half: slow_half!([$($kind)+] $($slow)?),
                 operands: &[$( (stringify!($field), stringify!($ty)) ),*],
                 doc: &[$( $doc ),*],
             }, )*
@@ -656,6 +747,23 @@ macro_rules! define_opcodes {
                 match self {
                     $( Opcode::$name => builtin!($($kind)+), )*
                 }
+            }
+
+            /// Returns the kind of function that does its slow half.
+            pub const fn slow_half(self) -> SlowHalf {
+                match self {
+                    $( Opcode::$name => slow_half!([$($kind)+] $($slow)?), )*
+                }
+            }
+
+            /// Returns whether the function of its slow half does the whole instruction, so that its arm need
+            /// not have run.
+            pub const fn is_done_by_slow_half(self) -> bool {
+                self.falls_through()
+                    && matches!(
+                        self.slow_half(),
+                        SlowHalf::Does | SlowHalf::Quiet | SlowHalf::Gives | SlowHalf::Jumps | SlowHalf::Stays
+                    )
             }
 
             /// Returns whether it is a call in place of the running function.
@@ -783,7 +891,7 @@ for_each_opcode!(define_opcodes);
 const _: () = {
     let mut row = 0;
     while row < OPCODES.len() {
-        let OpcodeInfo { opcode, substitute, callee, operands, .. } = OPCODES[row];
+        let OpcodeInfo { opcode, substitute, callee, operands, slow_half, .. } = OPCODES[row];
         let last = if operands.is_empty() { "" } else { operands[operands.len() - 1].1 };
         match substitute {
             Substitute::Value => assert!(is(operands[0].1, "Dst"), "`value` needs a Dst"),
@@ -797,6 +905,17 @@ const _: () = {
                 assert!(!is(operands[2].1, "Want"), "nobody delivers the values of a tail call")
             }
             Substitute::Silent | Substitute::Effect | Substitute::Never => {}
+        }
+        match slow_half {
+            SlowHalf::Gives => assert!(is(operands[0].1, "Dst"), "`gives` needs a Dst"),
+            SlowHalf::Jumps | SlowHalf::Stays => {
+                assert!(is(last, "Jump"), "`jumps` and `stays` need a Jump at their end")
+            }
+            SlowHalf::Test => {
+                assert!(matches!(substitute, Substitute::Test | Substitute::TestNot), "the row is no test")
+            }
+            SlowHalf::First => assert!(opcode.builtin().is_some(), "`first` needs a builtin"),
+            SlowHalf::None | SlowHalf::Builtin | SlowHalf::Does | SlowHalf::Rest | SlowHalf::Quiet => {}
         }
         match callee {
             Some(CallTarget::Global) => {

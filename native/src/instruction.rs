@@ -1,5 +1,6 @@
 //! The translation of one instruction: each has the fast ways that the interpreter's arm has, under the same
-//! conditions; what they do not take goes to the machine, which does what the rest of the arm does.
+//! conditions; what they do not take goes to the machine, which does the instruction's slow half. What has no
+//! translation here is left to the machine as a whole.
 
 use std::mem::offset_of;
 
@@ -21,7 +22,7 @@ use crate::objects::{ElementIndex, capture};
 use crate::translate::Translator;
 
 impl Translator<'_, '_> {
-    #[allow(clippy::too_many_lines, reason = "one arm for each sort of instruction")]
+    #[allow(clippy::too_many_lines, reason = "one arm for each sort of instruction with a fast way")]
     pub(crate) fn instruction(&mut self, step: &FlowStep) {
         use Arithmetic::{Add, Divide, Multiply, Subtract};
         use NumberOrder::{Equal, Greater, Less, LessEqual};
@@ -169,11 +170,11 @@ impl Translator<'_, '_> {
             }
             Instr::JumpIfType { test, code, .. } => match self.type_test(test.0, code.0) {
                 Some(test) => self.jump_if(test, step),
-                None => self.test_by_machine(step),
+                None => self.leave_to_machine(step),
             },
             Instr::JumpIfNotType { test, code, .. } => match self.type_test(test.0, code.0) {
                 Some(test) => self.jump_unless(test, step),
-                None => self.test_by_machine(step),
+                None => self.leave_to_machine(step),
             },
             Instr::JumpNumEq { left, right, .. } => self.jump_order(Equal, left.0, right.0, step),
             Instr::JumpNotNumEq { left, right, .. } => self.jump_order(Equal, left.0, right.0, step),
@@ -324,31 +325,8 @@ impl Translator<'_, '_> {
                 self.return_values();
             }
             Instr::ReturnAll {} => self.return_values(),
-            Instr::Apply { .. } | Instr::TailApply { .. } | Instr::Throw { .. } => self.leave(),
-
             Instr::Cons { dst, car, cdr } => self.cons(dst.0, car.0, cdr.0),
-            Instr::List { .. }
-            | Instr::Eql { .. }
-            | Instr::MakeBox { .. }
-            | Instr::BindList { .. }
-            | Instr::FunctionRef { .. }
-            | Instr::SetValues { .. }
-            | Instr::GetValues { .. }
-            | Instr::ValuesToList { .. }
-            | Instr::ListToValues { .. }
-            | Instr::NewTag { .. }
-            | Instr::PushCatch { .. }
-            | Instr::PushCleanup { .. }
-            | Instr::PushHandlerCase { .. }
-            | Instr::PushRecovery { .. }
-            | Instr::PushFailureCleanup { .. }
-            | Instr::PushHandlers { .. }
-            | Instr::PushMask { .. }
-            | Instr::PushScope { .. }
-            | Instr::PopControl { .. }
-            | Instr::Pass { .. }
-            | Instr::EnterCleanup {}
-            | Instr::EndCleanup {} => self.leave_to_machine(step),
+            _ => self.leave_to_machine(step),
         }
     }
 
@@ -373,8 +351,17 @@ impl Translator<'_, '_> {
         }
     }
 
-    /// Has the machine do the whole instruction.
-    pub(crate) fn leave_to_machine(&mut self, step: &FlowStep) {
+    /// Has the machine do the whole instruction: by the function of its slow half, if that does all of it; or
+    /// else by the loop.
+    fn leave_to_machine(&mut self, step: &FlowStep) {
+        if !step.instr.opcode().is_done_by_slow_half() {
+            return self.leave();
+        }
+        if step.target.is_some() {
+            let (target, next) = (self.target(step), self.block());
+            self.step_test(target, next);
+            return self.go_to(next);
+        }
         self.put_back();
         self.step();
         step.instr.visit_registers(|access| {
@@ -382,11 +369,5 @@ impl Translator<'_, '_> {
                 self.reload(first, count);
             }
         });
-    }
-
-    pub(crate) fn test_by_machine(&mut self, step: &FlowStep) {
-        let (target, next) = (self.target(step), self.block());
-        self.step_test(target, next);
-        self.go_to(next);
     }
 }

@@ -44,7 +44,7 @@ impl Random {
 
 macro_rules! define_builder {
     ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
-        { $( $field:ident : $ty:ident ),* } ; )*) => {
+        { $( $field:ident : $ty:ident ),* } $( , $slow:ident $half:path )? ; )*) => {
         /// The instruction whose operands, of these types, have these bits.
         pub(crate) fn build(opcode: Opcode, mut bits: impl FnMut(&'static str) -> u32) -> Instr {
             match opcode {

@@ -1,16 +1,21 @@
-//! The slow parts of instructions: each decodes its operands again, does its work, and writes its own result,
-//! so that the loop passes three registers and expects nothing back but a [`Signal`].
+//! The slow halves of instructions, which the rows of the opcode table name.
+//!
+//! Most decode their operands again, do their work, and write their own result, so that the loop passes three
+//! registers and expects nothing back but a [`Signal`]. Those that are the whole of a short arm take the
+//! instruction word, the frame and the constants from the loop, and return what the loop makes of them.
 //!
 //! Every function here has the contract of [`super::settle`]: `pc` is at an instruction of the row it serves,
-//! `base` is the running frame's, and what the verifier proved holds (V1 to V14).
+//! `base` is the running frame's, `k` are the constants of its function, and what the verifier proved holds
+//! (V1 to V14).
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::module::CaptureSource;
 use esl_bytecode::opcode::{Instr, Opcode, TypeCode};
 use esl_bytecode::operand::Role;
+use esl_bytecode::word::Word;
 
 use super::arguments::MAX_SPREAD;
-use super::{Signal, aux_at, code_of, constant, constants_of, failure, word_at};
+use super::{Signal, aux_at, code_of, constant, constants_of, failure, is_instance_of_exactly, word_at};
 use crate::heap::layout::{CodeObject, FunctionObject, Kind};
 use crate::names::class;
 use crate::number;
@@ -43,9 +48,8 @@ const fn opcode(number: u8) -> Opcode {
     }
 }
 
-/// Returns the builtin that the row of an opcode names. An arm that leaves an instruction without one to
-/// [`compute`] or [`test`] does not compile.
-pub(super) const fn builtin(opcode: Opcode) -> Builtin {
+/// Returns the builtin that the row of an opcode names.
+const fn builtin(opcode: Opcode) -> Builtin {
     match opcode.builtin() {
         Some(builtin) => builtin,
         None => panic!("the row of this instruction names no builtin"),
@@ -166,9 +170,39 @@ pub(super) unsafe fn loop_count(vm: &mut Vm, pc: *const u32, base: *mut Value) -
     }
 }
 
+/// `eql`.
+///
+/// # Safety
+/// See the module's header.
+#[inline(always)]
+pub(super) unsafe fn eql(vm: &Vm, word: Word, base: *mut Value, _k: *const Value) -> Value {
+    // SAFETY: V3: the operands are registers of the frame.
+    unsafe { Value::boolean(are_eql(vm, *base.add(word.b()), *base.add(word.c()))) }
+}
+
+/// `jump-eql` and `jump-not-eql`: whether the values are `eql`.
+///
+/// # Safety
+/// See the module's header.
+#[inline(always)]
+pub(super) unsafe fn jump_eql(vm: &Vm, word: Word, base: *mut Value, _k: *const Value) -> bool {
+    // SAFETY: V3: the operands are registers of the frame.
+    unsafe { are_eql(vm, *base.add(word.a()), *base.add(word.b())) }
+}
+
+/// `jump-eql-const` and `jump-not-eql-const`: whether the value is `eql` to the constant.
+///
+/// # Safety
+/// See the module's header.
+#[inline(always)]
+pub(super) unsafe fn jump_eql_const(vm: &Vm, word: Word, base: *mut Value, k: *const Value) -> bool {
+    // SAFETY: V3: the operand is a register of the frame; V4: the constant is there.
+    unsafe { are_eql(vm, *base.add(word.a()), *k.add(word.d())) }
+}
+
 /// Returns whether two values are `eql`.
 #[inline(always)]
-pub(super) fn eql(vm: &Vm, a: Value, b: Value) -> bool {
+fn are_eql(vm: &Vm, a: Value, b: Value) -> bool {
     let is_number = |object| vm.heap.kind(object).is_some_and(Kind::is_boxed_number);
     a == b || (a.is_object() && b.is_object() && is_number(b) && eql_numbers(vm, a, b))
 }
@@ -179,9 +213,29 @@ fn eql_numbers(vm: &Vm, a: Value, b: Value) -> bool {
     number::eql(&vm.heap, a, b)
 }
 
+/// `is-type`.
+///
+/// # Safety
+/// See the module's header.
+#[inline(always)]
+pub(super) unsafe fn is_type(vm: &Vm, word: Word, base: *mut Value, _k: *const Value) -> Value {
+    // SAFETY: V3: the operand is a register of the frame.
+    unsafe { Value::boolean(is_of_type(vm, *base.add(word.b()), word.c() as u8)) }
+}
+
+/// `jump-if-type` and `jump-if-not-type`: whether the value is of the type.
+///
+/// # Safety
+/// See the module's header.
+#[inline(always)]
+pub(super) unsafe fn jump_if_type(vm: &Vm, word: Word, base: *mut Value, _k: *const Value) -> bool {
+    // SAFETY: V3: the operand is a register of the frame.
+    unsafe { is_of_type(vm, *base.add(word.a()), word.b() as u8) }
+}
+
 /// Returns whether `value` is of the type with this code.
 #[inline(always)]
-pub(super) fn is_type(vm: &Vm, value: Value, code: u8) -> bool {
+fn is_of_type(vm: &Vm, value: Value, code: u8) -> bool {
     // The commonest tests of immediate values need no look at the heap.
     match TypeCode::from_number(code) {
         Some(TypeCode::Cons) => value.is_cons(),
@@ -259,13 +313,27 @@ fn expect_slot(vm: &mut Vm, instance: Value, slot: usize, class: Value) -> Resul
     Err(failure(vm, Raised::Type(instance, expected)))
 }
 
+/// `jump-if-not-instance`: whether the value is an instance of the class, or of a subclass.
+///
+/// # Safety
+/// See the module's header.
+#[inline(always)]
+pub(super) unsafe fn jump_if_instance(vm: &mut Vm, word: Word, base: *mut Value, k: *const Value) -> bool {
+    // SAFETY: V3: the operand is a register of the frame; V4: the constant is for a class.
+    unsafe {
+        let value = *base.add(word.a());
+        is_instance_of_exactly(value, *k.add(word.d()))
+            || (value.is_object() && is_instance(vm, base, value, word.d()))
+    }
+}
+
 /// Returns whether `value` is an instance of the class that is constant `index`, or of a subclass.
 ///
 /// # Safety
 /// The frame at `base` is the running one, and constant `index` of its function is for a class.
 #[cold]
 #[inline(never)]
-pub(super) unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, index: usize) -> bool {
+unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, index: usize) -> bool {
     // SAFETY: by the contract the frame at `base` runs, and the constant is for a class.
     let class = unsafe { class_constant(vm, base, index) };
     vm.names.is_instance(&vm.heap, value, class)
@@ -383,10 +451,11 @@ pub(super) unsafe fn get_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 
 /// `pass`.
 #[inline(never)]
-pub(super) unsafe fn pass(vm: &mut Vm, pc: *const u32) {
+pub(super) unsafe fn pass(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
     // SAFETY: by the contract there is an instruction at `pc`.
     let place = unsafe { word_at(pc) }.signed_e();
     vm.watch.note_passage(usize::try_from(place & PLACES).unwrap_or_default());
+    Signal::Next
 }
 
 /// The bits of the operand of `pass`.

@@ -56,7 +56,6 @@ mod unwind;
 mod variable;
 
 pub(crate) use collect::top_of_task;
-use esl_bytecode::builtin::Builtin;
 use esl_bytecode::for_each_opcode;
 use esl_bytecode::opcode::Opcode;
 use esl_bytecode::word::Word;
@@ -71,7 +70,7 @@ use crate::vm::Vm;
 
 macro_rules! define_operations {
     ({ $( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
-        { $( $field:ident : $ty:ident ),* } ; )* }
+        { $( $field:ident : $ty:ident ),* } $( , $slow:ident $half:path )? ; )* }
      $( $(#[doc = $fused_doc:literal])* $fused:ident = $fused_number:literal, [$($part:ident)+], $fits:ident; )*
     ) => {
         /// The operations of the loop: every opcode, those that only the machine's own stubs contain, and
@@ -418,11 +417,11 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             }
             // Goes on after an instruction of this many words.
             macro_rules! next {
-                ($words:literal) => {
+                ($words:expr) => {
                     next!($words, 0)
                 };
                 // One of several ends of an arm.
-                ($words:literal, $which:literal) => {{
+                ($words:expr, $which:literal) => {{
                     pc = pc.add($words);
                     apart!($which);
                     go_on!();
@@ -430,14 +429,14 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             }
             // Jumps from behind an instruction of this many words.
             macro_rules! jump {
-                ($words:literal, $offset:expr) => {{
+                ($words:expr, $offset:expr) => {{
                     pc = pc.add($words).offset($offset);
                     apart!();
                     go_on!();
                 }};
             }
             macro_rules! jump_if {
-                ($words:literal, $test:expr, $offset:expr) => {{
+                ($words:expr, $test:expr, $offset:expr) => {{
                     if $test {
                         jump!($words, $offset);
                     }
@@ -462,49 +461,97 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                 };
             }
-            // Leaves the instruction to a cold function.
-            macro_rules! cold {
-                ($words:literal, $function:path) => {{
-                    match $function(vm, pc, base) {
+            // Leaves the instruction to the function of its slow half.
+            macro_rules! leave_to {
+                ($name:ident, $half:path) => {{
+                    match $half(vm, pc, base) {
                         Signal::Next => {
                             attend!();
-                            next!($words);
+                            next!(const { Opcode::$name.words() });
                         }
                         signal => break signal,
                     }
                 }};
             }
-            // Leaves the instruction to the builtin that its row names.
-            macro_rules! compute {
-                ($operation:ident) => {{
-                    const _: Builtin = cold::builtin(Opcode::$operation);
-                    cold!(1, cold::compute::<{ Opcode::$operation as u8 }>)
-                }};
-            }
-            // Leaves the test to a cold function, which says whether it holds.
-            macro_rules! cold_test {
-                ($operation:ident, $function:path, $offset:expr) => {{
-                    match $function(vm, pc, base) {
+            // Leaves a test to a function that returns whether it holds.
+            macro_rules! leave_test_to {
+                ($name:ident, $half:path) => {{
+                    match $half(vm, pc, base) {
                         Ok(holds) => {
-                            jump_if!(2, holds == const { Opcode::$operation.jumps_when() }, $offset)
+                            let jumps = holds == const { Opcode::$name.jumps_when() };
+                            jump_if!(2, jumps, aux!() as i32 as isize)
                         }
                         Err(signal) => break signal,
                     }
                 }};
             }
+            // The slow half of an instruction, by the words of its row.
+            macro_rules! slow_half {
+                ($name:ident [test $builtin:ident]) => {
+                    leave_test_to!($name, cold::test::<{ Opcode::$name as u8 }>)
+                };
+                ($name:ident [test_not $builtin:ident]) => {
+                    leave_test_to!($name, cold::test::<{ Opcode::$name as u8 }>)
+                };
+                ($name:ident [$kind:ident $builtin:ident]) => {
+                    leave_to!($name, cold::compute::<{ Opcode::$name as u8 }>)
+                };
+                // The arm has tried the function.
+                ($name:ident [$kind:ident $builtin:ident] first $half:path) => {
+                    slow_half!($name [$kind $builtin])
+                };
+                ($name:ident [$($kind:ident)+] does $half:path) => {
+                    leave_to!($name, $half)
+                };
+                ($name:ident [$($kind:ident)+] rest $half:path) => {
+                    leave_to!($name, $half)
+                };
+                ($name:ident [$($kind:ident)+] quiet $half:path) => {{
+                    $half(vm, pc, base);
+                    next!(const { Opcode::$name.words() })
+                }};
+                ($name:ident [$($kind:ident)+] gives $half:path) => {{
+                    set!(word.a(), $half(vm, word, base, k));
+                    next!(const { Opcode::$name.words() })
+                }};
+                ($name:ident [$($kind:ident)+] jumps $half:path) => {
+                    jump_if!(2, $half(vm, word, base, k), aux!() as i32 as isize)
+                };
+                ($name:ident [$($kind:ident)+] stays $half:path) => {
+                    jump_if!(2, !$half(vm, word, base, k), aux!() as i32 as isize)
+                };
+                ($name:ident [$($kind:ident)+] test $half:path) => {
+                    leave_test_to!($name, $half)
+                };
+            }
+            // `slow!` is the slow half of an instruction; `first!` is the function that is tried before the
+            // builtin.
+            macro_rules! define_slow_halves {
+                ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal,
+                    $($kind:ident)+ { $( $field:ident : $ty:ident ),* } $( , $slow:ident $half:path )? ; )*
+                ) => {
+                    macro_rules! slow {
+                        $( ($name) => { slow_half!($name [$($kind)+] $($slow $half)?) }; )*
+                    }
+                    macro_rules! first {
+                        $( ($name) => { $( $half )? }; )*
+                    }
+                };
+            }
+            for_each_opcode!(define_slow_halves);
             // A double and a fixnum, or a zero.
             macro_rules! mixed {
-                ($operation:ident, $mixed:path, $x:expr, $y:expr) => {{
-                    let v = $mixed($x, $y);
+                ($operation:ident, $x:expr, $y:expr) => {{
+                    let v = first!($operation)($x, $y);
                     if v != Value::UNBOUND {
                         set!(word.a(), v);
                         next!(1, 2);
                     }
-                    compute!($operation)
+                    slow!($operation)
                 }};
             }
             macro_rules! arithmetic {
-                ($operation:ident, $fixnum:ident, $float:tt, $mixed:path) => {{
+                ($operation:ident, $fixnum:ident, $float:tt) => {{
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
                         let (sum, overflow) = (x.bits() as i64).$fixnum(y.bits() as i64);
@@ -518,7 +565,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1, 1);
                         }
                     }
-                    mixed!($operation, $mixed, x, y)
+                    mixed!($operation, x, y)
                 }};
             }
             macro_rules! compare {
@@ -531,13 +578,6 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                 }};
             }
-            // Leaves the test to the builtin that its row names.
-            macro_rules! compute_test {
-                ($operation:ident, $offset:expr) => {{
-                    const _: Builtin = cold::builtin(Opcode::$operation);
-                    cold_test!($operation, cold::test::<{ Opcode::$operation as u8 }>, $offset)
-                }};
-            }
             macro_rules! jump_compare {
                 ($operation:ident, $operator:tt) => {{
                     let offset = aux!() as i32 as isize;
@@ -548,7 +588,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         jump_if!(2, const { Opcode::$operation.jumps_when() }, offset),
                         jump_if!(2, const { !Opcode::$operation.jumps_when() }, offset)
                     );
-                    compute_test!($operation, offset)
+                    slow!($operation)
                 }};
             }
             macro_rules! jump_compare_int {
@@ -559,7 +599,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         let holds = (x.bits() as i64) $operator (i64::from(word.signed_d()) << 2);
                         jump_if!(2, holds == const { Opcode::$operation.jumps_when() }, offset);
                     }
-                    compute_test!($operation, offset)
+                    slow!($operation)
                 }};
             }
             macro_rules! bitwise {
@@ -569,7 +609,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::from_bits(x.bits() $operator y.bits()));
                         next!(1);
                     }
-                    compute!($operation)
+                    slow!($operation)
                 }};
             }
             // Makes the frame of a function with bytecode that takes exactly the given arguments.
@@ -714,7 +754,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     {
                         next!(1, 1);
                     }
-                    mixed!(Mul, double::mixed_multiply, x, y)
+                    mixed!(Mul, x, y)
                 }};
             }
             macro_rules! modulo {
@@ -726,7 +766,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::from_bits(remainder as u64));
                         next!(1);
                     }
-                    compute!(Mod)
+                    slow!(Mod)
                 }};
             }
             // Goes on with the next part of a fused instruction.
@@ -783,10 +823,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             // The second part of a fused instruction, as the instruction that it is.
             macro_rules! part {
                 (Add) => {
-                    arithmetic!(Add, overflowing_add, +, double::mixed_add)
+                    arithmetic!(Add, overflowing_add, +)
                 };
                 (Sub) => {
-                    arithmetic!(Sub, overflowing_sub, -, double::mixed_subtract)
+                    arithmetic!(Sub, overflowing_sub, -)
                 };
                 (Mul) => {
                     multiply!()
@@ -954,7 +994,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 () => {{
                     let list = get!(word.b());
                     if !list.is_cons() {
-                        compute!(Car)
+                        slow!(Car)
                     }
                     set!(word.a(), (*list.cons_ptr()).car);
                 }};
@@ -963,7 +1003,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 () => {{
                     let list = get!(word.b());
                     if !list.is_cons() {
-                        compute!(Cdr)
+                        slow!(Cdr)
                     }
                     set!(word.a(), (*list.cons_ptr()).cdr);
                 }};
@@ -986,7 +1026,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     {
                         next!(1, 1);
                     }
-                    compute!(AddInt)
+                    slow!(AddInt)
                 }};
             }
 
@@ -1016,8 +1056,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
 
                 // ---- arithmetic
-                LoopOperation::Add => arithmetic!(Add, overflowing_add, +, double::mixed_add),
-                LoopOperation::Sub => arithmetic!(Sub, overflowing_sub, -, double::mixed_subtract),
+                LoopOperation::Add => arithmetic!(Add, overflowing_add, +),
+                LoopOperation::Sub => arithmetic!(Sub, overflowing_sub, -),
                 LoopOperation::Mul => multiply!(),
                 LoopOperation::Div => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
@@ -1029,7 +1069,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     {
                         next!(1);
                     }
-                    mixed!(Div, double::mixed_divide, x, y)
+                    mixed!(Div, x, y)
                 }
                 LoopOperation::AddInt => add_int!(next!(1)),
                 LoopOperation::Floor => {
@@ -1039,7 +1079,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::from_bits((quotient << 2) as u64));
                         next!(1);
                     }
-                    compute!(Floor)
+                    slow!(Floor)
                 }
                 LoopOperation::Truncate => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
@@ -1048,7 +1088,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::from_bits((quotient << 2) as u64));
                         next!(1);
                     }
-                    compute!(Truncate)
+                    slow!(Truncate)
                 }
                 LoopOperation::Mod => modulo!(),
                 LoopOperation::Rem => {
@@ -1058,7 +1098,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::from_bits(remainder as u64));
                         next!(1);
                     }
-                    compute!(Rem)
+                    slow!(Rem)
                 }
                 LoopOperation::LogAnd => bitwise!(LogAnd, &),
                 LoopOperation::LogIor => bitwise!(LogIor, |),
@@ -1077,7 +1117,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1);
                         }
                     }
-                    compute!(Ash)
+                    slow!(Ash)
                 }
 
                 // ---- comparisons that give T or NIL
@@ -1089,24 +1129,21 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     set!(word.a(), Value::boolean(get!(word.b()) == get!(word.c())));
                     next!(1)
                 }
-                LoopOperation::Eql => {
-                    set!(word.a(), Value::boolean(cold::eql(vm, get!(word.b()), get!(word.c()))));
-                    next!(1)
-                }
+                LoopOperation::Eql => slow!(Eql),
                 LoopOperation::NumEq => {
                     compare!(==, get!(word.b()), get!(word.c()),
                         { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
-                    compute!(NumEq)
+                    slow!(NumEq)
                 }
                 LoopOperation::Less => {
                     compare!(<, get!(word.b()), get!(word.c()),
                         { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
-                    compute!(Less)
+                    slow!(Less)
                 }
                 LoopOperation::LessEq => {
                     compare!(<=, get!(word.b()), get!(word.c()),
                         { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
-                    compute!(LessEq)
+                    slow!(LessEq)
                 }
                 LoopOperation::CharEq => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
@@ -1114,12 +1151,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::boolean(x == y));
                         next!(1);
                     }
-                    compute!(CharEq)
+                    slow!(CharEq)
                 }
-                LoopOperation::IsType => {
-                    set!(word.a(), Value::boolean(cold::is_type(vm, get!(word.b()), word.c() as u8)));
-                    next!(1)
-                }
+                LoopOperation::IsType => slow!(IsType),
 
                 // ---- jumps forward
                 LoopOperation::JumpAlways => jump!(1, word.signed_e() as isize),
@@ -1144,24 +1178,12 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 LoopOperation::JumpNotEq => {
                     jump_if!(2, get!(word.a()) != get!(word.b()), aux!() as i32 as isize)
                 }
-                LoopOperation::JumpEql => {
-                    jump_if!(2, cold::eql(vm, get!(word.a()), get!(word.b())), aux!() as i32 as isize)
-                }
-                LoopOperation::JumpNotEql => {
-                    jump_if!(2, !cold::eql(vm, get!(word.a()), get!(word.b())), aux!() as i32 as isize)
-                }
-                LoopOperation::JumpEqlConst => {
-                    jump_if!(2, cold::eql(vm, get!(word.a()), *k.add(word.d())), aux!() as i32 as isize)
-                }
-                LoopOperation::JumpNotEqlConst => {
-                    jump_if!(2, !cold::eql(vm, get!(word.a()), *k.add(word.d())), aux!() as i32 as isize)
-                }
-                LoopOperation::JumpIfType => {
-                    jump_if!(2, cold::is_type(vm, get!(word.a()), word.b() as u8), aux!() as i32 as isize)
-                }
-                LoopOperation::JumpIfNotType => {
-                    jump_if!(2, !cold::is_type(vm, get!(word.a()), word.b() as u8), aux!() as i32 as isize)
-                }
+                LoopOperation::JumpEql => slow!(JumpEql),
+                LoopOperation::JumpNotEql => slow!(JumpNotEql),
+                LoopOperation::JumpEqlConst => slow!(JumpEqlConst),
+                LoopOperation::JumpNotEqlConst => slow!(JumpNotEqlConst),
+                LoopOperation::JumpIfType => slow!(JumpIfType),
+                LoopOperation::JumpIfNotType => slow!(JumpIfNotType),
                 LoopOperation::JumpNumEq => jump_compare!(JumpNumEq, ==),
                 LoopOperation::JumpNotNumEq => jump_compare!(JumpNotNumEq, ==),
                 LoopOperation::JumpLess => jump_compare!(JumpLess, <),
@@ -1220,7 +1242,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             jump_if!(2, sum < limit.bits() as i64, aux!() as i32 as isize);
                         }
                     }
-                    cold_test!(LoopCount, cold::loop_count, aux!() as i32 as isize)
+                    slow!(LoopCount)
                 }
 
                 // ---- lists
@@ -1229,7 +1251,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), v);
                         next!(1);
                     }
-                    compute!(Cons)
+                    slow!(Cons)
                 }
                 LoopOperation::Car => {
                     car!();
@@ -1248,7 +1270,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1);
                         }
                     }
-                    compute!(Cadr)
+                    slow!(Cadr)
                 }
                 LoopOperation::Cddr => {
                     let list = get!(word.b());
@@ -1259,7 +1281,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1);
                         }
                     }
-                    compute!(Cddr)
+                    slow!(Cddr)
                 }
                 LoopOperation::SetCar => {
                     let pair = get!(word.a());
@@ -1267,7 +1289,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         vm.heap.store(&raw mut (*pair.cons_ptr()).car, get!(word.b()));
                         next!(1);
                     }
-                    compute!(SetCar)
+                    slow!(SetCar)
                 }
                 LoopOperation::SetCdr => {
                     let pair = get!(word.a());
@@ -1275,9 +1297,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         vm.heap.store(&raw mut (*pair.cons_ptr()).cdr, get!(word.b()));
                         next!(1);
                     }
-                    compute!(SetCdr)
+                    slow!(SetCdr)
                 }
-                LoopOperation::List => cold!(1, cold::list),
+                LoopOperation::List => slow!(List),
 
                 // ---- vectors and structures
                 LoopOperation::VectorRef | LoopOperation::ArrayRef => {
@@ -1290,9 +1312,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         next!(1);
                     }
                     if word.number() == Opcode::VectorRef as u8 {
-                        compute!(VectorRef)
+                        slow!(VectorRef)
                     }
-                    compute!(ArrayRef)
+                    slow!(ArrayRef)
                 }
                 LoopOperation::VectorSet | LoopOperation::ArraySet => {
                     let (vector, index) = (get!(word.a()), get!(word.b()));
@@ -1304,9 +1326,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         next!(1);
                     }
                     if word.number() == Opcode::VectorSet as u8 {
-                        compute!(VectorSet)
+                        slow!(VectorSet)
                     }
-                    compute!(ArraySet)
+                    slow!(ArraySet)
                 }
                 LoopOperation::VectorRefInt => {
                     let (vector, index) = (get!(word.b()), word.c());
@@ -1314,7 +1336,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), *element(vector, index));
                         next!(1);
                     }
-                    compute!(VectorRefInt)
+                    slow!(VectorRefInt)
                 }
                 LoopOperation::VectorSetInt => {
                     let (vector, index) = (get!(word.a()), word.b());
@@ -1322,7 +1344,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         vm.heap.store(element(vector, index), get!(word.c()));
                         next!(1);
                     }
-                    compute!(VectorSetInt)
+                    slow!(VectorSetInt)
                 }
                 LoopOperation::CharRef => {
                     let (string, index) = (get!(word.b()), get!(word.c()));
@@ -1337,7 +1359,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             }
                         }
                     }
-                    compute!(CharRef)
+                    slow!(CharRef)
                 }
                 LoopOperation::Slot => {
                     let instance = get!(word.b());
@@ -1351,7 +1373,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(2);
                         }
                     }
-                    cold!(2, cold::slot)
+                    slow!(Slot)
                 }
                 LoopOperation::SetSlot => {
                     let instance = get!(word.a());
@@ -1362,17 +1384,12 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(2);
                         }
                     }
-                    cold!(2, cold::set_slot)
+                    slow!(SetSlot)
                 }
-                LoopOperation::JumpIfNotInstance => {
-                    let value = get!(word.a());
-                    let holds = is_instance_of_exactly(value, *k.add(word.d()))
-                        || (value.is_object() && cold::is_instance(vm, base, value, word.d()));
-                    jump_if!(2, !holds, aux!() as i32 as isize)
-                }
+                LoopOperation::JumpIfNotInstance => slow!(JumpIfNotInstance),
 
                 // ---- variables
-                LoopOperation::MakeBox => cold!(1, cold::make_box),
+                LoopOperation::MakeBox => slow!(MakeBox),
                 LoopOperation::BoxRef => {
                     // SAFETY: V7: the register holds a box. In the three arms below that deal with boxes, V7
                     // says the same of the register or capture.
@@ -1391,7 +1408,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), function);
                         next!(1);
                     }
-                    cold!(1, cold::make_closure)
+                    slow!(MakeClosure)
                 }
                 LoopOperation::PatchCapture => {
                     // SAFETY: V8: the register holds a closure with such a capture.
@@ -1426,7 +1443,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), value);
                         next!(1);
                     }
-                    cold!(1, variable::symbol_value)
+                    slow!(SymbolValue)
                 }
                 LoopOperation::SetSymbolValue => {
                     // SAFETY: V4: the constant is a symbol.
@@ -1435,12 +1452,12 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         vm.heap.store(&raw mut (*symbol).value, get!(word.a()));
                         next!(1);
                     }
-                    cold!(1, variable::set_symbol_value)
+                    slow!(SetSymbolValue)
                 }
-                LoopOperation::Bind => cold!(1, variable::bind),
-                LoopOperation::Unbind => cold!(1, variable::unbind),
-                LoopOperation::BindList => cold!(1, unwind::bind_list),
-                LoopOperation::FunctionRef => cold!(1, variable::function_ref),
+                LoopOperation::Bind => slow!(Bind),
+                LoopOperation::Unbind => slow!(Unbind),
+                LoopOperation::BindList => slow!(BindList),
+                LoopOperation::FunctionRef => slow!(FunctionRef),
 
                 // ---- calls
                 LoopOperation::Call => {
@@ -1530,34 +1547,31 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 LoopOperation::ReturnAll => return_all!(),
 
                 // ---- the value list
-                LoopOperation::SetValues => cold!(1, cold::set_values),
-                LoopOperation::GetValues => cold!(1, cold::get_values),
-                LoopOperation::ValuesToList => cold!(1, cold::values_to_list),
-                LoopOperation::ListToValues => cold!(1, cold::list_to_values),
+                LoopOperation::SetValues => slow!(SetValues),
+                LoopOperation::GetValues => slow!(GetValues),
+                LoopOperation::ValuesToList => slow!(ValuesToList),
+                LoopOperation::ListToValues => slow!(ListToValues),
 
                 // ---- the control stack
-                LoopOperation::NewTag => cold!(1, unwind::new_tag),
-                LoopOperation::PushCatch => cold!(2, unwind::push_catch),
-                LoopOperation::PushCleanup => cold!(2, unwind::push_cleanup),
-                LoopOperation::PushHandlerCase => cold!(2, unwind::push_handler_case),
-                LoopOperation::PushRecovery => cold!(2, unwind::push_recovery),
-                LoopOperation::PushFailureCleanup => cold!(2, unwind::push_failure_cleanup),
-                LoopOperation::PushHandlers => cold!(1, unwind::push_handlers),
-                LoopOperation::PushMask => cold!(1, unwind::push_mask),
-                LoopOperation::PushScope => cold!(1, unwind::push_scope),
-                LoopOperation::PopControl => cold!(1, unwind::pop),
-                LoopOperation::EnterCleanup => cold!(1, unwind::enter_cleanup),
-                LoopOperation::EndCleanup => cold!(1, unwind::end_cleanup),
+                LoopOperation::NewTag => slow!(NewTag),
+                LoopOperation::PushCatch => slow!(PushCatch),
+                LoopOperation::PushCleanup => slow!(PushCleanup),
+                LoopOperation::PushHandlerCase => slow!(PushHandlerCase),
+                LoopOperation::PushRecovery => slow!(PushRecovery),
+                LoopOperation::PushFailureCleanup => slow!(PushFailureCleanup),
+                LoopOperation::PushHandlers => slow!(PushHandlers),
+                LoopOperation::PushMask => slow!(PushMask),
+                LoopOperation::PushScope => slow!(PushScope),
+                LoopOperation::PopControl => slow!(PopControl),
+                LoopOperation::EnterCleanup => slow!(EnterCleanup),
+                LoopOperation::EndCleanup => slow!(EndCleanup),
                 LoopOperation::Throw => match unwind::throw(vm, pc, base) {
                     Signal::Next => next!(1),
                     signal => break signal,
                 },
 
                 // ---- counting
-                LoopOperation::Pass => {
-                    cold::pass(vm, pc);
-                    next!(1)
-                }
+                LoopOperation::Pass => slow!(Pass),
 
                 // ---- stubs
                 LoopOperation::ErrorReturn | LoopOperation::InterruptReturn => {

@@ -1,19 +1,20 @@
-//! What machine code asks of the machine: the rest of an instruction whose fast way does not apply, and calls
-//! of builtins.
+//! The helpers of machine code: the slow half of an instruction, as its row of the opcode table names it, and
+//! calls of builtins.
 //!
 //! All of it has the contract of a helper: machine code calls it at an instruction of the running frame, with
 //! the context of [`super::run`]. It does what the arm of the loop does behind the fast ways that machine
 //! code has, and asks for a safepoint where the arm does.
 
+use esl_bytecode::for_each_opcode;
 use esl_bytecode::opcode::Opcode;
 use esl_native::NativeContext;
 use esl_native::abi::{STEP_JUMP, STEP_NEXT, STEP_SIGNAL, STEP_VALUES};
 
-use super::super::{Signal, aux_at, cold, constant, double, is_instance_of_exactly, substitute, unwind};
-use super::super::{variable, word_at};
+use super::super::{
+    Signal, aux_at, code_of, cold, constants_of, double, substitute, unwind, variable, word_at,
+};
 use super::{Caller, make_words};
 use crate::heap::Phase;
-use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::Exit;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -33,6 +34,16 @@ enum Done {
 impl From<Signal> for Done {
     fn from(signal: Signal) -> Done {
         if signal == Signal::Next { Done::Slow } else { Done::Signal(signal) }
+    }
+}
+
+impl Done {
+    /// Returns what a test has come to.
+    fn of_test(opcode: Opcode, holds: Result<bool, Signal>) -> Done {
+        match holds {
+            Ok(holds) => Done::Jump(holds == opcode.jumps_when()),
+            Err(signal) => Done::Signal(signal),
+        }
     }
 }
 
@@ -280,207 +291,79 @@ unsafe fn call_native(vm: &mut Vm, pc: *const u32, base: *mut Value, wants_one: 
     }
 }
 
-/// Does the instruction at `pc` in the frame at `base`.
-///
-/// # Safety
-/// It is one of verified code, and that frame is one of the code's function.
-#[allow(clippy::too_many_lines, reason = "one arm for each sort of instruction")]
-unsafe fn instruction(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Done {
-    macro_rules! compute {
-        ($operation:ident) => {
-            cold::compute::<{ Opcode::$operation as u8 }>(vm, pc, base).into()
-        };
-    }
-    macro_rules! test {
-        ($operation:ident) => {
-            match cold::test::<{ Opcode::$operation as u8 }>(vm, pc, base) {
-                Ok(holds) => Done::Jump(holds == const { Opcode::$operation.jumps_when() }),
-                Err(signal) => Done::Signal(signal),
-            }
-        };
-    }
-    // SAFETY: by the contract; what depends on data is tested, as in the arms of the loop.
-    unsafe {
-        let word = word_at(pc);
-        let get = |register: usize| *base.add(register);
-        let set = |register: usize, value: Value| {
-            *base.add(register) = value;
-            Done::Fast
-        };
-        macro_rules! mixed {
-            ($operation:ident, $mixed:path) => {{
-                let v = $mixed(get(word.b()), get(word.c()));
-                if v != Value::UNBOUND { set(word.a(), v) } else { compute!($operation) }
-            }};
+macro_rules! slow_half {
+    // It is nothing that machine code asks for: the loop does it.
+    ($name:ident [$kind:ident] $vm:ident $pc:ident $base:ident) => {
+        Done::Signal(Signal::Reload)
+    };
+    ($name:ident [call $callee:ident] $vm:ident $pc:ident $base:ident) => {
+        Done::Signal(Signal::Reload)
+    };
+    ($name:ident [tail $callee:ident] $vm:ident $pc:ident $base:ident) => {
+        Done::Signal(Signal::Reload)
+    };
+    ($name:ident [test $builtin:ident] $vm:ident $pc:ident $base:ident) => {
+        Done::of_test(Opcode::$name, cold::test::<{ Opcode::$name as u8 }>($vm, $pc, $base))
+    };
+    ($name:ident [test_not $builtin:ident] $vm:ident $pc:ident $base:ident) => {
+        Done::of_test(Opcode::$name, cold::test::<{ Opcode::$name as u8 }>($vm, $pc, $base))
+    };
+    ($name:ident [$kind:ident $builtin:ident] $vm:ident $pc:ident $base:ident) => {
+        cold::compute::<{ Opcode::$name as u8 }>($vm, $pc, $base).into()
+    };
+    ($name:ident [$($kind:ident)+] $vm:ident $pc:ident $base:ident first $half:path) => {{
+        let word = word_at($pc);
+        let value = $half(*$base.add(word.b()), *$base.add(word.c()));
+        if value != Value::UNBOUND {
+            *$base.add(word.a()) = value;
+            return Done::Fast;
         }
-        let Some(opcode) = word.opcode() else { return Done::Signal(Signal::Reload) };
-        match opcode {
-            Opcode::Add => mixed!(Add, double::mixed_add),
-            Opcode::Sub => mixed!(Sub, double::mixed_subtract),
-            Opcode::Mul => mixed!(Mul, double::mixed_multiply),
-            Opcode::Div => mixed!(Div, double::mixed_divide),
-            Opcode::AddInt => compute!(AddInt),
-            Opcode::Floor => compute!(Floor),
-            Opcode::Truncate => compute!(Truncate),
-            Opcode::Mod => compute!(Mod),
-            Opcode::Rem => compute!(Rem),
-            Opcode::LogAnd => compute!(LogAnd),
-            Opcode::LogIor => compute!(LogIor),
-            Opcode::LogXor => compute!(LogXor),
-            Opcode::Ash => compute!(Ash),
-            Opcode::NumEq => compute!(NumEq),
-            Opcode::Less => compute!(Less),
-            Opcode::LessEq => compute!(LessEq),
-            Opcode::CharEq => compute!(CharEq),
-            Opcode::Eql => set(word.a(), Value::boolean(cold::eql(vm, get(word.b()), get(word.c())))),
-            Opcode::IsType => set(word.a(), Value::boolean(cold::is_type(vm, get(word.b()), word.c() as u8))),
-
-            Opcode::JumpEql => Done::Jump(cold::eql(vm, get(word.a()), get(word.b()))),
-            Opcode::JumpNotEql => Done::Jump(!cold::eql(vm, get(word.a()), get(word.b()))),
-            Opcode::JumpEqlConst => Done::Jump(cold::eql(vm, get(word.a()), constant(base, word.d()))),
-            Opcode::JumpNotEqlConst => Done::Jump(!cold::eql(vm, get(word.a()), constant(base, word.d()))),
-            Opcode::JumpIfType => Done::Jump(cold::is_type(vm, get(word.a()), word.b() as u8)),
-            Opcode::JumpIfNotType => Done::Jump(!cold::is_type(vm, get(word.a()), word.b() as u8)),
-            Opcode::JumpNumEq => test!(JumpNumEq),
-            Opcode::JumpNotNumEq => test!(JumpNotNumEq),
-            Opcode::JumpLess => test!(JumpLess),
-            Opcode::JumpNotLess => test!(JumpNotLess),
-            Opcode::JumpLessEq => test!(JumpLessEq),
-            Opcode::JumpNotLessEq => test!(JumpNotLessEq),
-            Opcode::JumpNumEqInt => test!(JumpNumEqInt),
-            Opcode::JumpNotNumEqInt => test!(JumpNotNumEqInt),
-            Opcode::JumpLessInt => test!(JumpLessInt),
-            Opcode::JumpNotLessInt => test!(JumpNotLessInt),
-            Opcode::JumpGreaterInt => test!(JumpGreaterInt),
-            Opcode::JumpNotGreaterInt => test!(JumpNotGreaterInt),
-            Opcode::LoopLess => test!(LoopLess),
-            Opcode::LoopNotLess => test!(LoopNotLess),
-            Opcode::LoopCount => match cold::loop_count(vm, pc, base) {
-                Ok(holds) => Done::Jump(holds == const { Opcode::LoopCount.jumps_when() }),
-                Err(signal) => Done::Signal(signal),
-            },
-
-            Opcode::Cons => match vm.heap.cons_in_hole(get(word.b()), get(word.c())) {
-                Some(v) => set(word.a(), v),
-                None => compute!(Cons),
-            },
-            Opcode::Car => compute!(Car),
-            Opcode::Cdr => compute!(Cdr),
-            Opcode::Cadr => compute!(Cadr),
-            Opcode::Cddr => compute!(Cddr),
-            Opcode::SetCar => compute!(SetCar),
-            Opcode::SetCdr => compute!(SetCdr),
-            Opcode::List => cold::list(vm, pc, base).into(),
-
-            Opcode::VectorRef => compute!(VectorRef),
-            Opcode::ArrayRef => compute!(ArrayRef),
-            Opcode::VectorSet => compute!(VectorSet),
-            Opcode::ArraySet => compute!(ArraySet),
-            Opcode::VectorRefInt => compute!(VectorRefInt),
-            Opcode::VectorSetInt => compute!(VectorSetInt),
-            Opcode::CharRef => compute!(CharRef),
-            Opcode::Slot => cold::slot(vm, pc, base).into(),
-            Opcode::SetSlot => cold::set_slot(vm, pc, base).into(),
-            Opcode::JumpIfNotInstance => {
-                let value = get(word.a());
-                let holds = is_instance_of_exactly(value, constant(base, word.d()))
-                    || (value.is_object() && cold::is_instance(vm, base, value, word.d()));
-                Done::Jump(!holds)
-            }
-
-            Opcode::MakeBox => cold::make_box(vm, pc, base).into(),
-            Opcode::MakeClosure => {
-                let function = constant(base, word.d());
-                if (*function.object_ptr()).kind == Kind::Function {
-                    return set(word.a(), function);
-                }
-                cold::make_closure(vm, pc, base).into()
-            }
-            Opcode::SymbolValue => {
-                let symbol = constant(base, word.d());
-                let cell = symbol.object_ptr().cast::<SymbolObject>();
-                let value = if (*cell).header.flags & SymbolObject::EVER_BOUND == 0 {
-                    (*cell).value
-                } else {
-                    variable::bound_value(vm, symbol)
-                };
-                if value != Value::UNBOUND {
-                    return set(word.a(), value);
-                }
-                variable::symbol_value(vm, pc, base).into()
-            }
-            Opcode::SetSymbolValue => variable::set_symbol_value(vm, pc, base).into(),
-            Opcode::Bind => variable::bind(vm, pc, base).into(),
-            Opcode::Unbind => variable::unbind(vm, pc, base).into(),
-            Opcode::BindList => unwind::bind_list(vm, pc, base).into(),
-            Opcode::FunctionRef => variable::function_ref(vm, pc, base).into(),
-
-            // The values of a return are set without a look at what was charged.
-            Opcode::ReturnValues => {
-                cold::set_values(vm, pc, base);
-                Done::Fast
-            }
-            Opcode::SetValues => cold::set_values(vm, pc, base).into(),
-            Opcode::GetValues => cold::get_values(vm, pc, base).into(),
-            Opcode::ValuesToList => cold::values_to_list(vm, pc, base).into(),
-            Opcode::ListToValues => cold::list_to_values(vm, pc, base).into(),
-
-            Opcode::NewTag => unwind::new_tag(vm, pc, base).into(),
-            Opcode::PushCatch => unwind::push_catch(vm, pc, base).into(),
-            Opcode::PushCleanup => unwind::push_cleanup(vm, pc, base).into(),
-            Opcode::PushHandlerCase => unwind::push_handler_case(vm, pc, base).into(),
-            Opcode::PushRecovery => unwind::push_recovery(vm, pc, base).into(),
-            Opcode::PushFailureCleanup => unwind::push_failure_cleanup(vm, pc, base).into(),
-            Opcode::PushHandlers => unwind::push_handlers(vm, pc, base).into(),
-            Opcode::PushMask => unwind::push_mask(vm, pc, base).into(),
-            Opcode::PushScope => unwind::push_scope(vm, pc, base).into(),
-            Opcode::PopControl => unwind::pop(vm, pc, base).into(),
-            Opcode::EnterCleanup => unwind::enter_cleanup(vm, pc, base).into(),
-            Opcode::EndCleanup => unwind::end_cleanup(vm, pc, base).into(),
-
-            Opcode::Pass => {
-                cold::pass(vm, pc);
-                Done::Fast
-            }
-
-            // Machine code does these itself, or leaves at them.
-            Opcode::Move
-            | Opcode::LoadInt
-            | Opcode::LoadConst
-            | Opcode::LoadNil
-            | Opcode::LoadTrue
-            | Opcode::Not
-            | Opcode::Eq
-            | Opcode::JumpAlways
-            | Opcode::JumpIfNil
-            | Opcode::JumpIfNotNil
-            | Opcode::JumpIfCons
-            | Opcode::JumpIfNotCons
-            | Opcode::JumpIfSupplied
-            | Opcode::JumpEq
-            | Opcode::JumpNotEq
-            | Opcode::Loop
-            | Opcode::LoopIfNil
-            | Opcode::LoopIfNotNil
-            | Opcode::LoopIfCons
-            | Opcode::BoxRef
-            | Opcode::BoxSet
-            | Opcode::PatchCapture
-            | Opcode::CaptureRef
-            | Opcode::CaptureBoxRef
-            | Opcode::CaptureBoxSet
-            | Opcode::Call
-            | Opcode::CallGlobal
-            | Opcode::CallSelf
-            | Opcode::CallBuiltin
-            | Opcode::Apply
-            | Opcode::TailApply
-            | Opcode::TailCall
-            | Opcode::TailCallGlobal
-            | Opcode::TailCallBuiltin
-            | Opcode::Return
-            | Opcode::ReturnAll
-            | Opcode::Throw => Done::Signal(Signal::Reload),
-        }
-    }
+        slow_half!($name [$($kind)+] $vm $pc $base)
+    }};
+    ($name:ident [$($kind:ident)+] $vm:ident $pc:ident $base:ident does $half:path) => {
+        $half($vm, $pc, $base).into()
+    };
+    ($name:ident [$($kind:ident)+] $vm:ident $pc:ident $base:ident rest $half:path) => {
+        $half($vm, $pc, $base).into()
+    };
+    ($name:ident [$($kind:ident)+] $vm:ident $pc:ident $base:ident quiet $half:path) => {{
+        $half($vm, $pc, $base);
+        Done::Fast
+    }};
+    ($name:ident [$($kind:ident)+] $vm:ident $pc:ident $base:ident gives $half:path) => {{
+        let word = word_at($pc);
+        *$base.add(word.a()) = $half($vm, word, $base, constants_of(code_of(*$base.sub(2))));
+        Done::Fast
+    }};
+    ($name:ident [$($kind:ident)+] $vm:ident $pc:ident $base:ident jumps $half:path) => {
+        Done::Jump($half($vm, word_at($pc), $base, constants_of(code_of(*$base.sub(2)))))
+    };
+    ($name:ident [$($kind:ident)+] $vm:ident $pc:ident $base:ident stays $half:path) => {
+        Done::Jump(!$half($vm, word_at($pc), $base, constants_of(code_of(*$base.sub(2)))))
+    };
+    ($name:ident [$($kind:ident)+] $vm:ident $pc:ident $base:ident test $half:path) => {
+        Done::of_test(Opcode::$name, $half($vm, $pc, $base))
+    };
 }
+
+macro_rules! define_instruction {
+    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
+        { $( $field:ident : $ty:ident ),* } $( , $slow:ident $half:path )? ; )*) => {
+        /// Does the slow half of the instruction at `pc` in the frame at `base`.
+        ///
+        /// # Safety
+        /// It is one of verified code, and that frame is one of the code's function.
+        unsafe fn instruction(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Done {
+            // SAFETY: by the contract, which is that of the functions that the rows name; F2: below the base
+            // is the function of the frame.
+            unsafe {
+                match word_at(pc).opcode() {
+                    $( Some(Opcode::$name) => slow_half!($name [$($kind)+] vm pc base $($slow $half)?), )*
+                    None => Done::Signal(Signal::Reload),
+                }
+            }
+        }
+    };
+}
+
+for_each_opcode!(define_instruction);
