@@ -5,6 +5,7 @@
 //! frame above the failed instruction; nothing has been unwound. What `%raise` returns takes the place of the
 //! operation's result.
 
+use esl_bytecode::symbol::Symbol;
 use esl_host::Right;
 use smallvec::{SmallVec, smallvec};
 
@@ -29,54 +30,175 @@ pub enum Expected {
     Written(&'static str),
 }
 
-/// Failure of an operation, before it becomes a condition.
-#[derive(Clone, Debug)]
-pub enum Raised {
-    /// `type-error`: the datum is not of the expected type.
-    Type(Value, Expected),
-    /// `type-error`: the value of this special variable is not of the expected type.
-    Variable(Value, Value, Expected),
-    /// `type-error`: start and end that do not bound a part of a sequence of so many elements.
-    Bounds(Value, Value, usize),
-    /// `division-by-zero`: name of the operation in `COMMON-LISP`, operands.
-    DivisionByZero(&'static str, [Value; 2]),
-    /// `arithmetic-error` with a text: the result does not exist or is too large.
-    Arithmetic(&'static str, String),
-    /// `floating-point-overflow`: name of the operation.
-    FloatOverflow(&'static str),
-    /// `unbound-variable`: the symbol.
-    UnboundVariable(Value),
-    /// `undefined-function`: the symbol.
-    UndefinedFunction(Value),
-    /// `program-error` with a text: wrong number of arguments, unknown key and the like.
-    Program(String),
-    /// `control-error` with a text.
-    Control(String),
-    /// `parse-error` with a text.
-    Parse(String),
-    /// `reader-error` with a text: where, what was expected, what to do.
-    Reader(String),
-    /// `end-of-file` on a stream.
-    EndOfFile(Value),
-    /// `stream-error` on a stream, with a text.
-    Stream(Value, String),
-    /// `file-error`: the name of the file, a text.
-    File(String, String),
-    /// `package-error`: the name of the package, a text.
-    Package(String, String),
-    /// `simple-error` with a text.
-    Simple(String),
-    /// A failure of the given cause (a keyword's name) and one argument.
-    Cause(&'static str, Value),
-    /// `:permission-denied`: the right, its object, and the flag that would grant it, if one would.
-    Denied(Right, String, Option<String>),
-    /// A failure of the given cause without arguments.
-    Failure(&'static str),
-    /// The task's stack has reached its limit.
-    StackExhausted,
-    /// The heap has reached its limit, or an object would be larger than it.
-    HeapExhausted,
+macro_rules! define_raised {
+    (($heap:ident, $names:ident) $( $(#[doc = $doc:literal])* $name:ident $( ( $( $part:ident : $ty:ty ),* ) )?
+        => $home:ident $class:literal { $( $slot:literal : $value:expr ),* } ; )*) => {
+        /// Failure of an operation, before it becomes a condition.
+        #[derive(Clone, Debug)]
+        pub enum Raised {
+            $( $(#[doc = $doc])* $name $( ( $( $ty ),* ) )?, )*
+        }
+
+        /// The conditions that failures become: the classes, and their slots in their order. The build of the
+        /// library compares them with its definitions.
+        pub const CONDITIONS: &[(&str, &[&str])] = &[$( ($class, &[$( $slot ),*]) ),*];
+
+        impl Raised {
+            /// Returns the arguments of `%raise` for this failure: the name of the class of its condition,
+            /// and the values of the slots.
+            ///
+            /// # Errors
+            /// As for every allocation.
+            pub(crate) fn arguments(
+                &self,
+                $heap: &mut Heap,
+                $names: &mut Names,
+            ) -> Result<Arguments, AllocError> {
+                match self {
+                    $( Raised::$name $( ( $( $part ),* ) )? => {
+                        let class = $names.intern($heap, &Symbol::$home($class))?;
+                        Ok(smallvec![class, $( $value ),*])
+                    } )*
+                }
+            }
+
+            /// Calls `visit` with every value of the failure.
+            pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
+                match self {
+                    $( Raised::$name $( ( $( $part ),* ) )? => { $( $( $part.visit(visit); )* )? } )*
+                }
+            }
+        }
+    };
 }
+
+// Each row has the parts of a failure, and the condition that it becomes.
+define_raised! {
+    (heap, names)
+    /// The datum is not of the expected type.
+    Type(datum: Value, expected: Expected)
+        => cl "TYPE-ERROR" { "DATUM": *datum, "EXPECTED-TYPE": expected.specifier(heap, names)? };
+    /// The value of this special variable is not of the expected type.
+    Variable(symbol: Value, datum: Value, expected: Expected)
+        => esl "DETAILED-TYPE-ERROR" {
+            "FORMAT-CONTROL": heap.alloc_str("The value of ~s, ~s, is not of type ~s.")?,
+            "FORMAT-ARGUMENTS": {
+                let expected = expected.specifier(heap, names)?;
+                heap.list(&[*symbol, *datum, expected])?
+            },
+            "DATUM": *datum,
+            "EXPECTED-TYPE": expected.specifier(heap, names)?
+        };
+    /// Start and end do not bound a part of a sequence of so many elements.
+    Bounds(start: Value, end: Value, length: usize)
+        => cl "TYPE-ERROR" {
+            "DATUM": heap.cons(*start, *end)?,
+            "EXPECTED-TYPE": {
+                let least = start.as_index().unwrap_or(0);
+                let text = format!("(CONS (INTEGER 0 {length}) (INTEGER {least} {length}))");
+                read_specifier(heap, names, &text)?
+            }
+        };
+    /// The operation with this name in `COMMON-LISP` divides by zero.
+    DivisionByZero(operation: &'static str, operands: [Value; 2])
+        => cl "DIVISION-BY-ZERO" {
+            "OPERATION": names.intern_cl(heap, operation)?, "OPERANDS": heap.list(operands)?, "TEXT": Value::NIL
+        };
+    /// The result of the operation does not exist or is too large, as a text says.
+    Arithmetic(operation: &'static str, text: String)
+        => cl "ARITHMETIC-ERROR" {
+            "OPERATION": names.intern_cl(heap, operation)?, "OPERANDS": Value::NIL, "TEXT": heap.alloc_str(text)?
+        };
+    /// The result of the operation is too large for a float.
+    FloatOverflow(operation: &'static str)
+        => cl "FLOATING-POINT-OVERFLOW" {
+            "OPERATION": names.intern_cl(heap, operation)?, "OPERANDS": Value::NIL, "TEXT": Value::NIL
+        };
+    /// The variable with this name has no value.
+    UnboundVariable(symbol: Value) => cl "UNBOUND-VARIABLE" { "NAME": *symbol };
+    /// The function with this name is not defined. The library finds the name if the symbol holds a function
+    /// `(setf name)`.
+    UndefinedFunction(symbol: Value) => cl "UNDEFINED-FUNCTION" { "NAME": *symbol };
+    /// A call has the wrong number of arguments, an unknown key and the like, as a text says.
+    Program(text: String) => cl "PROGRAM-ERROR" { "TEXT": heap.alloc_str(text)? };
+    /// A transfer of control fails, as a text says.
+    Control(text: String) => cl "CONTROL-ERROR" { "TEXT": heap.alloc_str(text)? };
+    /// A text cannot be parsed, as another says.
+    Parse(text: String) => cl "PARSE-ERROR" { "TEXT": heap.alloc_str(text)? };
+    /// A text cannot be read, as another says: where, what was expected, what to do. The library adds the
+    /// stream.
+    Reader(text: String) => cl "READER-ERROR" { "TEXT": heap.alloc_str(text)?, "STREAM": Value::NIL };
+    /// The stream has ended.
+    EndOfFile(stream: Value) => cl "END-OF-FILE" { "STREAM": *stream, "TEXT": Value::NIL };
+    /// An operation on the stream fails, as a text says.
+    Stream(stream: Value, text: String)
+        => cl "STREAM-ERROR" { "STREAM": *stream, "TEXT": heap.alloc_str(text)? };
+    /// An operation on the file with this name fails, as a text says.
+    File(name: String, text: String)
+        => cl "FILE-ERROR" { "PATHNAME": heap.alloc_str(name)?, "TEXT": heap.alloc_str(text)? };
+    /// An operation on the package with this name fails, as a text says.
+    Package(name: String, text: String)
+        => cl "PACKAGE-ERROR" { "PACKAGE": heap.alloc_str(name)?, "TEXT": heap.alloc_str(text)? };
+    /// An operation fails, as a text says.
+    Simple(text: String)
+        => cl "SIMPLE-ERROR" {
+            "FORMAT-CONTROL": heap.alloc_str("~a")?,
+            "FORMAT-ARGUMENTS": { let text = heap.alloc_str(text)?; heap.list(&[text])? }
+        };
+    /// A failure of the given cause, the name of a keyword, and one argument.
+    Cause(cause: &'static str, argument: Value)
+        => esl "FAILURE" { "CAUSE": names.keyword(heap, cause)?, "ARGUMENTS": heap.list(&[*argument])? };
+    /// A failure of the given cause without arguments.
+    Failure(cause: &'static str)
+        => esl "FAILURE" { "CAUSE": names.keyword(heap, cause)?, "ARGUMENTS": Value::NIL };
+    /// The right to the object is missing. The text is the flag that would grant it, if one would.
+    Denied(right: Right, object: String, flag: Option<String>)
+        => esl "FAILURE" {
+            "CAUSE": names.keyword(heap, "PERMISSION-DENIED")?,
+            "ARGUMENTS": {
+                let right = names.keyword(heap, &right.name().to_uppercase())?;
+                let object = heap.alloc_str(object)?;
+                let flag = flag.as_ref().map_or(Ok(Value::NIL), |flag| heap.alloc_str(flag))?;
+                heap.list(&[right, object, flag])?
+            }
+        };
+    /// The task's stack has reached its limit.
+    StackExhausted => esl "STACK-EXHAUSTED" {};
+    /// The heap has reached its limit, or an object would be larger than it.
+    HeapExhausted => esl "HEAP-EXHAUSTED" {};
+}
+
+/// A part of a failure, as the collector sees it.
+trait RaisedPart {
+    /// Calls `visit` with every value in it.
+    fn visit(&self, _visit: &mut dyn FnMut(Value)) {}
+}
+
+impl RaisedPart for Value {
+    fn visit(&self, visit: &mut dyn FnMut(Value)) {
+        visit(*self);
+    }
+}
+
+impl RaisedPart for [Value; 2] {
+    fn visit(&self, visit: &mut dyn FnMut(Value)) {
+        self.iter().copied().for_each(visit);
+    }
+}
+
+impl RaisedPart for Expected {
+    fn visit(&self, visit: &mut dyn FnMut(Value)) {
+        if let Expected::Specifier(specifier) = self {
+            visit(*specifier);
+        }
+    }
+}
+
+impl RaisedPart for &'static str {}
+impl RaisedPart for String {}
+impl RaisedPart for Option<String> {}
+impl RaisedPart for usize {}
+impl RaisedPart for Right {}
 
 /// Reason why a builtin returns no value. As wide as a value, so that an [`Outcome`] comes back in two
 /// registers.
@@ -157,92 +279,6 @@ fn read_specifier(heap: &mut Heap, names: &mut Names, text: &str) -> Result<Valu
         }
     }
     Ok(lists.pop().and_then(|items| items.first().copied()).unwrap_or(Value::T))
-}
-
-impl Raised {
-    /// Returns the arguments of `%raise` for this failure: a keyword, and what goes with it.
-    ///
-    /// # Errors
-    /// As for every allocation.
-    pub(crate) fn arguments(&self, heap: &mut Heap, names: &mut Names) -> Result<Arguments, AllocError> {
-        let (keyword, rest): (&str, Arguments) = match self {
-            Raised::Type(datum, expected) => {
-                ("TYPE-ERROR", smallvec![*datum, expected.specifier(heap, names)?])
-            }
-            Raised::Variable(symbol, datum, expected) => {
-                ("VARIABLE-TYPE-ERROR", smallvec![*symbol, *datum, expected.specifier(heap, names)?])
-            }
-            Raised::Bounds(start, end, length) => {
-                let least = start.as_index().unwrap_or(0);
-                let specifier = format!("(CONS (INTEGER 0 {length}) (INTEGER {least} {length}))");
-                let bounds = heap.cons(*start, *end)?;
-                ("TYPE-ERROR", smallvec![bounds, read_specifier(heap, names, &specifier)?])
-            }
-            Raised::DivisionByZero(operation, operands) => {
-                let operation = names.intern_cl(heap, operation)?;
-                ("DIVISION-BY-ZERO", smallvec![operation, heap.list(operands)?])
-            }
-            Raised::Arithmetic(operation, text) => {
-                let operation = names.intern_cl(heap, operation)?;
-                ("ARITHMETIC-ERROR", smallvec![operation, heap.alloc_str(text)?])
-            }
-            Raised::FloatOverflow(operation) => {
-                ("FLOATING-POINT-OVERFLOW", smallvec![names.intern_cl(heap, operation)?])
-            }
-            Raised::UnboundVariable(symbol) => ("UNBOUND-VARIABLE", smallvec![*symbol]),
-            Raised::UndefinedFunction(symbol) => ("UNDEFINED-FUNCTION", smallvec![*symbol]),
-            Raised::Program(text) => ("PROGRAM-ERROR", smallvec![heap.alloc_str(text)?]),
-            Raised::Control(text) => ("CONTROL-ERROR", smallvec![heap.alloc_str(text)?]),
-            Raised::Parse(text) => ("PARSE-ERROR", smallvec![heap.alloc_str(text)?]),
-            Raised::Reader(text) => ("READER-ERROR", smallvec![heap.alloc_str(text)?]),
-            Raised::Simple(text) => ("SIMPLE-ERROR", smallvec![heap.alloc_str(text)?]),
-            Raised::EndOfFile(stream) => ("END-OF-FILE", smallvec![*stream]),
-            Raised::Stream(stream, text) => ("STREAM-ERROR", smallvec![*stream, heap.alloc_str(text)?]),
-            Raised::File(name, text) => {
-                ("FILE-ERROR", smallvec![heap.alloc_str(name)?, heap.alloc_str(text)?])
-            }
-            Raised::Package(name, text) => {
-                ("PACKAGE-ERROR", smallvec![heap.alloc_str(name)?, heap.alloc_str(text)?])
-            }
-            Raised::Cause(cause, argument) => ("CAUSE", smallvec![names.keyword(heap, cause)?, *argument]),
-            Raised::Denied(right, object, flag) => {
-                let right = names.keyword(heap, &right.name().to_uppercase())?;
-                let object = heap.alloc_str(object)?;
-                let flag = match flag {
-                    Some(flag) => heap.alloc_str(flag)?,
-                    None => Value::NIL,
-                };
-                ("PERMISSION-DENIED", smallvec![right, object, flag])
-            }
-            Raised::Failure(cause) => (cause, smallvec![]),
-            Raised::StackExhausted => ("STACK-EXHAUSTED", smallvec![]),
-            Raised::HeapExhausted => ("HEAP-EXHAUSTED", smallvec![]),
-        };
-        let mut arguments: Arguments = smallvec![names.keyword(heap, keyword)?];
-        arguments.extend(rest);
-        Ok(arguments)
-    }
-
-    /// Calls `visit` with every value of the failure.
-    pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
-        match self {
-            Raised::Type(datum, expected) | Raised::Variable(_, datum, expected) => {
-                // The variable is known to the machine.
-                visit(*datum);
-                if let Expected::Specifier(specifier) = expected {
-                    visit(*specifier);
-                }
-            }
-            Raised::Bounds(start, end, _) => [*start, *end].into_iter().for_each(visit),
-            Raised::DivisionByZero(_, operands) => operands.iter().copied().for_each(visit),
-            Raised::UnboundVariable(value)
-            | Raised::UndefinedFunction(value)
-            | Raised::EndOfFile(value)
-            | Raised::Stream(value, _)
-            | Raised::Cause(_, value) => visit(*value),
-            _ => {}
-        }
-    }
 }
 
 impl From<LoadError> for Raised {

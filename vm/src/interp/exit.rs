@@ -3,6 +3,7 @@
 //! A failure becomes a call of the library's `%raise` above the failed instruction; nothing has been unwound.
 
 use esl_bytecode::builtin::BUILTINS;
+use esl_bytecode::symbol::Symbol;
 use esl_host::Host;
 
 use super::call::{FramePlace, call, call_requested};
@@ -72,15 +73,24 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
         Ok(arguments) => arguments,
         Err(error) => return Signal::Exit(error.into()),
     };
-    vm.exchange.raised = None;
     let function = vm.names.known.raise;
     if !vm.names.is_defined(&vm.heap, function) {
-        // Without a library nobody can handle it.
-        let words: Vec<String> = arguments.iter().map(|&v| describe(&vm.heap, v)).collect();
-        vm.embedder.last_words = Some(words.join(" "));
-        vm.scheduler.task_mut().begin_end(TaskEnd::Failed(arguments[0]));
+        // Without a library there are no conditions, and nothing handles a failure: its cause ends the task.
+        let name = vm.names.name_of(&vm.heap, arguments[0]);
+        let (cause, details) = match name.as_ref().map_or("", Symbol::name) {
+            "FAILURE" => (arguments[1], &arguments[2..]),
+            name => match vm.names.keyword(&mut vm.heap, name) {
+                Ok(cause) => (cause, &arguments[1..]),
+                Err(error) => return Signal::Exit(error.into()),
+            },
+        };
+        let words = std::iter::once(&cause).chain(details).map(|&v| describe(&vm.heap, v));
+        vm.embedder.last_words = Some(words.collect::<Vec<_>>().join(" "));
+        vm.exchange.raised = None;
+        vm.scheduler.task_mut().begin_end(TaskEnd::Failed(cause));
         return Signal::Unwind;
     }
+    vm.exchange.raised = None;
     // SAFETY: F1 holds by the contract, and a frame above the running one needs no window.
     unsafe { call(vm, function, &*arguments, FramePlace::Above) }
 }

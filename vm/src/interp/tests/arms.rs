@@ -276,7 +276,7 @@ const PROGRAMS: &[(&str, &str)] = &[
         "(-4 -3 -1 1 0 1152921504606846976)",
     ),
     ("load-true r0 \n load-int r1 1 \n add r2 r0 r1 \n return r2", ":TYPE-ERROR T NUMBER"),
-    ("load-int r0 1 \n load-int r1 0 \n div r2 r0 r1 \n return r2", ":DIVISION-BY-ZERO / (1 0)"),
+    ("load-int r0 1 \n load-int r1 0 \n div r2 r0 r1 \n return r2", ":DIVISION-BY-ZERO / (1 0) NIL"),
     // Comparisons with the results T and NIL.
     (
         "load-int r0 1 \n load-const r1 k6 \n load-const r2 k5 \n load-const r3 k8 \n eq r4 r0 r0
