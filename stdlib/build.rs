@@ -10,15 +10,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use esl_bytecode::compile::{Compile, Environment, GlobalFunction, GlobalVariable, drive};
+use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file::WriteError;
 use esl_bytecode::module::Module;
+use esl_bytecode::span::Span;
 use esl_bytecode::symbol::ESL_PACKAGE;
 use esl_bytecode::{file, link};
 use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_compiler::session::Compiler;
 use esl_host::VirtualHost;
 use esl_vm::load::LoadError;
+use esl_vm::raise::CONDITIONS;
+use esl_vm::records::RECORDS;
 use esl_vm::run::CallError;
 use esl_vm::vm::{Config, Vm};
 
@@ -55,6 +59,9 @@ enum BuildError {
     Fails(String, Box<CallError>),
     /// The library contains an object that no file can hold.
     NotWritten(WriteError),
+    /// A record, or a condition, has other fields than the machine takes it to have: its name, the fields that
+    /// it has, and those that the machine expects.
+    OtherFields(String, Vec<String>, Vec<String>),
 }
 
 impl fmt::Display for BuildError {
@@ -67,6 +74,13 @@ impl fmt::Display for BuildError {
             BuildError::NotLoaded(name, error) => write!(f, "{name} cannot be loaded: {error}"),
             BuildError::Fails(name, failure) => write!(f, "{name} fails: {failure}"),
             BuildError::NotWritten(error) => error.fmt(f),
+            BuildError::OtherFields(name, found, expected) => write!(
+                f,
+                "`{name}` has the fields {}, where the machine expects {}: change the row of \
+                 `vm/src/names/records.rs` or `vm/src/raise.rs` with the definition",
+                found.join(" "),
+                expected.join(" ")
+            ),
         }
     }
 }
@@ -101,6 +115,7 @@ fn build(folder: &Path) -> Result<Vec<u8>, BuildError> {
         library.add(&format!("stdlib/{name}.esl"), read(&path)?.into())?;
     }
     library.report_doubts();
+    library.check_fields()?;
     let module = esl_vm::load::prepare(link::link(library.modules));
     file::write(&module).map_err(BuildError::NotWritten)
 }
@@ -173,9 +188,44 @@ impl LibraryBuild {
         }
     }
 
+    /// Checks that the machine finds the fields of records, and the slots of conditions, where they are.
+    fn check_fields(&mut self) -> Result<(), BuildError> {
+        for &(name, fields) in RECORDS {
+            let as_in_library = |name: &str| name.to_uppercase().replace('_', "-");
+            let (name, fields) =
+                (format!("%{}", as_in_library(name)), fields.iter().copied().map(as_in_library));
+            let found = self.names_of("GET", &name, Some("%FIELDS"));
+            expect_fields(name, found, fields.collect())?;
+        }
+        for &(class, slots) in CONDITIONS {
+            let found = self.names_of("%CLASS-SLOTS", class, None);
+            expect_fields(class.into(), found, slots.iter().map(|&slot| slot.into()).collect())?;
+        }
+        Ok(())
+    }
+
+    /// Returns the list of names that a function returns for a name and another one.
+    fn names_of(&mut self, function: &str, name: &str, other: Option<&str>) -> Vec<String> {
+        let names = [Some(function), Some(name), other].into_iter().flatten();
+        let symbols = names.map(|name| self.machine.intern(None, name, false).map(DatumKind::Symbol));
+        let Ok(symbols) = symbols.collect::<Result<Vec<_>, _>>() else { return Vec::new() };
+        let data = symbols.into_iter().map(|symbol| Datum::new(symbol, Span::default()));
+        let Ok(values) = data.map(|datum| self.machine.import(&datum)).collect::<Result<Vec<_>, _>>() else {
+            return Vec::new();
+        };
+        let Ok(found) = self.machine.call(values[0], &values[1..], u64::MAX) else { return Vec::new() };
+        let found = found.first().and_then(|&list| self.machine.export(list).ok());
+        let names = found.iter().flat_map(Datum::elements).filter_map(Datum::as_symbol);
+        names.map(|symbol| symbol.name().to_owned()).collect()
+    }
+
     fn render(&self, diagnostic: &Diagnostic) -> String {
         Renderer::default().render(diagnostic, &self.sources)
     }
+}
+
+fn expect_fields(name: String, found: Vec<String>, expected: Vec<String>) -> Result<(), BuildError> {
+    if found == expected { Ok(()) } else { Err(BuildError::OtherFields(name, found, expected)) }
 }
 
 fn warn(text: &str) {

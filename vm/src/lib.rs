@@ -17,7 +17,7 @@ pub mod schedule;
 pub mod task;
 pub mod vm;
 
-pub use names::load;
+pub use names::{load, records};
 pub use snapshot::Snapshot;
 
 /// Number of the machine's behaviour, as far as a run can tell: what work costs how many ticks, when slices

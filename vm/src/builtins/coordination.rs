@@ -2,16 +2,18 @@
 //! read, setting a fluent, granting a request at once.
 //!
 //! Each could be written in ESL, and is here because it is the whole cost of a wake-up, or of an uncontended
-//! resource. The records are those of `sources.esl` and `resources.esl`, whose fields come in the order of
-//! the constants. A builtin that is given something else does nothing, or gives up.
+//! resource. The records are those of `sources.esl` and `resources.esl`. A builtin that is given something
+//! else does nothing, or gives up.
 
 use smallvec::SmallVec;
 
 use crate::builtins::LIMIT;
 use crate::equality::{self, KeyTest};
 use crate::heap::{Heap, Kind};
+use crate::names::records::{claim, reads, request, resource, source};
 use crate::raise::{Exit, Outcome};
 use crate::run;
+use crate::task::PRIORITIES;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{WaitOptions, event, link};
@@ -20,50 +22,9 @@ use super::event::begin_wait;
 use super::expect::{exactly, optional};
 use super::lookup;
 
-/// The fields of a source.
-mod source {
-    pub(super) const EVENT: usize = 0;
-    pub(super) const VALUE: usize = 1;
-    pub(super) const SEEN: usize = 2;
-}
-
-/// The fields of what a form has read.
-mod reads {
-    pub(super) const TASK: usize = 0;
-    pub(super) const SOURCES: usize = 1;
-    pub(super) const COUNT: usize = 2;
-    pub(super) const WATCH: usize = 3;
-    pub(super) const ANY: usize = 4;
-}
-
-/// The fields of a resource.
-mod resource {
-    pub(super) const HOLDERS: usize = 1;
-    pub(super) const USED: usize = 7;
-    /// Element of a shelf: the bits of the priorities at which claims are.
-    pub(super) const BITS: usize = 8;
-}
-
-/// The fields of a claim.
-mod claim {
-    pub(super) const NEXT: usize = 0;
-    pub(super) const PREVIOUS: usize = 1;
-    pub(super) const REQUEST: usize = 4;
-    pub(super) const RESOURCE: usize = 5;
-    pub(super) const AMOUNT: usize = 6;
-    pub(super) const LENGTH: usize = 8;
-}
-
-/// The fields of a request.
-mod request {
-    pub(super) const TASK: usize = 0;
-    pub(super) const CLAIMS: usize = 1;
-    pub(super) const SIZE: usize = 2;
-    pub(super) const PRIORITY: usize = 3;
-    pub(super) const STATE: usize = 5;
-    pub(super) const OUTER: usize = 7;
-    pub(super) const LENGTH: usize = 10;
-}
+/// Element of a shelf: the bits of the priorities at which claims are. The claims of each priority come
+/// before it.
+const SHELF_BITS: usize = PRIORITIES;
 
 /// The most sources that one wait is for; with more, any signal wakes.
 const MOST_SOURCES: usize = 4000;
@@ -81,7 +42,10 @@ pub(super) fn set_fluent(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Err(Exit::Slowly);
     }
     vm.scheduler.point()?;
-    let Some(&[event, before]) = vm.heap.slots(fluent, Kind::SimpleVector) else { return Ok(value) };
+    let Some(slots) = vm.heap.slots::<{ source::VALUE + 1 }>(fluent, Kind::SimpleVector) else {
+        return Ok(value);
+    };
+    let (event, before) = (slots[source::EVENT], slots[source::VALUE]);
     let mut work = LIMIT;
     match equality::same(&vm.heap, KeyTest::Equal, before, value, &mut work) {
         Some(true) => {}
@@ -107,7 +71,7 @@ pub(super) fn new_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// Creates a record of what this task reads, for a watch or `NIL`.
 fn make_reads(vm: &mut Vm, watch: Value) -> Outcome {
     let any = event::count(&vm.heap, vm.scheduler.any_event);
-    let mut fields = [Value::NIL; 6];
+    let mut fields = [Value::NIL; reads::LENGTH];
     fields[reads::TASK] = vm.scheduler.task().object;
     fields[reads::COUNT] = Value::small(0);
     fields[reads::WATCH] = watch;
@@ -118,11 +82,14 @@ fn make_reads(vm: &mut Vm, watch: Value) -> Outcome {
 pub(super) fn noted_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [fluent, reads] = exactly(arguments);
     // Tasks made by the form have copies of its binding.
-    let Some(&[_, value, seen]) = vm.heap.slots(fluent, Kind::SimpleVector) else { return Ok(Value::NIL) };
-    if let Some(&[task, _, _, watch]) = vm.heap.slots(reads, Kind::SimpleVector)
-        && task == vm.scheduler.task().object
+    let Some(slots) = vm.heap.slots::<{ source::SEEN + 1 }>(fluent, Kind::SimpleVector) else {
+        return Ok(Value::NIL);
+    };
+    let (value, seen) = (slots[source::VALUE], slots[source::SEEN]);
+    if let Some(slots) = vm.heap.slots::<{ reads::WATCH + 1 }>(reads, Kind::SimpleVector)
+        && slots[reads::TASK] == vm.scheduler.task().object
     {
-        if watch.is_true() {
+        if slots[reads::WATCH].is_true() {
             return Err(Exit::Slowly);
         }
         if seen != reads {
@@ -146,8 +113,9 @@ pub(super) fn note_read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn note_source(vm: &mut Vm, source: Value, reads: Value) -> Result<(), Exit> {
     vm.scheduler.point_of_read()?;
     let heap = &mut vm.heap;
-    let Some(&[_, sources, sum]) = heap.slots(reads, Kind::SimpleVector) else { return Ok(()) };
-    let sum = sum
+    let Some(slots) = heap.slots::<{ reads::COUNT + 1 }>(reads, Kind::SimpleVector) else { return Ok(()) };
+    let sources = slots[reads::SOURCES];
+    let sum = slots[reads::COUNT]
         .as_fixnum()
         .unwrap_or(0)
         .wrapping_add(event::count(heap, heap.slot_or_nil(source, source::EVENT)));
@@ -209,16 +177,16 @@ pub(super) fn wait_for_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// Returns the event of what a form has read, with its count from before, if that is one source.
 fn only_event(heap: &Heap, reads: Value) -> Option<(Value, i64)> {
-    let &[_, sources, count] = heap.slots(reads, Kind::SimpleVector)?;
-    let sources = heap.as_cons(sources).filter(|sources| sources.cdr.is_nil())?;
-    Some((heap.slot_or_nil(sources.car, source::EVENT), count.as_fixnum()?))
+    let slots = heap.slots::<{ reads::COUNT + 1 }>(reads, Kind::SimpleVector)?;
+    let sources = heap.as_cons(slots[reads::SOURCES]).filter(|sources| sources.cdr.is_nil())?;
+    Some((heap.slot_or_nil(sources.car, source::EVENT), slots[reads::COUNT].as_fixnum()?))
 }
 
 // ---- resources
 
 /// Returns whether no claim is on a shelf.
 fn is_empty_shelf(heap: &Heap, shelf: Value) -> bool {
-    heap.slot_or_nil(shelf, resource::BITS) == Value::small(0)
+    heap.slot_or_nil(shelf, SHELF_BITS) == Value::small(0)
 }
 
 /// Returns the resource with this name, and how much of it would be used if a request got so much
@@ -226,12 +194,12 @@ fn is_empty_shelf(heap: &Heap, shelf: Value) -> bool {
 fn free_resource(vm: &mut Vm, name: Value, amount: Value, priority: Value) -> Option<(Value, Value)> {
     let plist = vm.heap.symbol(name)?.plist;
     let resource = lookup::getf(vm, &[plist, vm.names.known.resource]).ok()?;
-    let [.., waiters, _, _, _, capacity, used] =
-        vm.heap.slots::<{ resource::USED + 1 }>(resource, Kind::SimpleVector)?;
-    let (capacity, used) = (capacity.as_fixnum()?, used.as_fixnum()?);
+    let slots = vm.heap.slots::<{ resource::USED + 1 }>(resource, Kind::SimpleVector)?;
+    let (capacity, used) = (slots[resource::CAPACITY].as_fixnum()?, slots[resource::USED].as_fixnum()?);
     let sum = amount.as_fixnum().filter(|&amount| amount >= 1)?.checked_add(used)?;
-    let is_free =
-        sum <= capacity && matches!(priority.as_fixnum(), Some(0..=7)) && is_empty_shelf(&vm.heap, *waiters);
+    let is_free = sum <= capacity
+        && matches!(priority.as_fixnum(), Some(0..=7))
+        && is_empty_shelf(&vm.heap, slots[resource::WAITERS]);
     Some((resource, Value::fixnum(sum).filter(|_| is_free)?))
 }
 
@@ -273,15 +241,18 @@ pub(super) fn request_at_once(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// Takes from a request what it holds, if that is an amount of one resource that no request waits for; `None`
 /// if it is not.
 fn give_back(heap: &mut Heap, request: Value, granted: Value) -> Option<()> {
-    let &[_, claims, _, _, _, state] = heap.slots(request, Kind::SimpleVector)?;
+    let slots = heap.slots::<{ request::STATE + 1 }>(request, Kind::SimpleVector)?;
+    let (claims, state) = (slots[request::CLAIMS], slots[request::STATE]);
     if state.is_nil() {
         return Some(());
     }
     let claim = heap.as_cons(claims).filter(|claims| state == granted && claims.cdr.is_nil())?.car;
-    let &[next, previous, _, _, _, resource, amount, preemptible] = heap.slots(claim, Kind::SimpleVector)?;
-    let &[_, _, waiters, _, _, _, _, used] = heap.slots(resource, Kind::SimpleVector)?;
-    let left = Value::fixnum(used.as_fixnum()?.checked_sub(amount.as_fixnum()?)?)?;
-    if preemptible.is_true() || !is_empty_shelf(heap, waiters) {
+    let slots = heap.slots::<{ claim::LENGTH }>(claim, Kind::SimpleVector)?;
+    let (next, previous, resource) = (slots[claim::NEXT], slots[claim::PREVIOUS], slots[claim::RESOURCE]);
+    let (amount, preemptible) = (slots[claim::AMOUNT], slots[claim::PREEMPTIBLE]);
+    let slots = heap.slots::<{ resource::USED + 1 }>(resource, Kind::SimpleVector)?;
+    let left = Value::fixnum(slots[resource::USED].as_fixnum()?.checked_sub(amount.as_fixnum()?)?)?;
+    if preemptible.is_true() || !is_empty_shelf(heap, slots[resource::WAITERS]) {
         return None;
     }
     if next == claim {

@@ -6,6 +6,7 @@ use smallvec::SmallVec;
 
 use crate::heap::AllocError;
 use crate::interp::frames::Frame;
+use crate::names::records::frame;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::report::{self, NotedFrame};
 use crate::run;
@@ -233,7 +234,14 @@ fn row_of(vm: &mut Vm, frame: &NotedFrame, variables: Value) -> Result<Value, Al
     let has_no_name = frame.name.is_nil() && !frame.is_top_level;
     let name = if has_no_name { vm.heap.list(&[vm.names.known.lambda])? } else { frame.name };
     let [source, line, column] = place_parts(vm, frame.place.as_ref())?;
-    vm.heap.list(&[name, source, line, column, variables, Value::boolean(frame.is_of_library)])
+    let mut fields = [Value::NIL; frame::LENGTH];
+    fields[frame::FUNCTION] = name;
+    fields[frame::SOURCE] = source;
+    fields[frame::LINE] = line;
+    fields[frame::COLUMN] = column;
+    fields[frame::VARIABLES] = variables;
+    fields[frame::LIBRARY_P] = Value::boolean(frame.is_of_library);
+    vm.heap.list(&fields)
 }
 
 /// Returns source, line and column of a place, `NIL` if it is unknown.

@@ -38,6 +38,7 @@ mod known;
 pub mod load;
 mod opaque;
 mod package;
+pub mod records;
 pub(crate) mod stream;
 
 pub(crate) use known::Known;

@@ -14,12 +14,9 @@ use crate::describe::describe;
 use crate::heap::AllocError;
 use crate::interp::start::first_code_of;
 use crate::names::load::{TOP_LEVEL, is_of_library};
+use crate::names::records::history;
 use crate::value::Value;
 use crate::vm::Vm;
-
-/// Fields of a history, and of an origin: see `handlers.esl`.
-const FRAMES: usize = 0;
-const ORIGIN: usize = 2;
 
 /// Most frames, and tasks, of a failure that are told of.
 const MOST_FRAMES: usize = 500;
@@ -92,7 +89,7 @@ impl Vm {
         let mut notes = vec![(task, history)];
         let mut history = history;
         while notes.len() < MOST_TASKS
-            && let Some(origin) = self.heap.as_cons(self.field_of_list(history, ORIGIN))
+            && let Some(origin) = self.heap.as_cons(self.field_of_list(history, history::ORIGIN))
         {
             notes.push((origin.car, origin.cdr));
             history = origin.cdr;
@@ -110,7 +107,8 @@ impl Vm {
                 place: frame.place,
                 is_of_library: frame.is_of_library,
             };
-            frames.extend(self.noted_frames(self.field_of_list(history, FRAMES)).into_iter().map(row));
+            frames
+                .extend(self.noted_frames(self.field_of_list(history, history::FRAMES)).into_iter().map(row));
         }
         frames.truncate(MOST_FRAMES);
         frames

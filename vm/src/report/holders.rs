@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::label::{CHILD_TASK, REQUEST, field_of, items, ring};
+use super::label::{field_of, items, ring};
 use crate::heap::Kind;
+use crate::names::records::{child, claim, request, resource};
 use crate::task::{Task, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -31,13 +32,14 @@ pub(super) fn holders_of(vm: &Vm, task: &Task, owners: &BTreeMap<u64, u64>) -> V
         match vm.heap.symbol(pair.car).and_then(|symbol| vm.heap.string_text(symbol.name)).as_deref() {
             Some("RESOURCE") => {
                 for resource in items(vm, pair.cdr) {
-                    let claims = ring(vm, field_of(vm, resource, 1));
-                    let tasks = claims.map(|claim| field_of(vm, field_of(vm, claim, REQUEST), 0));
+                    let claims = ring(vm, field_of(vm, resource, resource::HOLDERS));
+                    let tasks =
+                        claims.map(|claim| field_of(vm, field_of(vm, claim, claim::REQUEST), request::TASK));
                     holders.extend(tasks.filter_map(|task| number_of(vm, task)));
                 }
             }
             Some("CHILDREN") => {
-                let tasks = items(vm, pair.cdr).map(|child| field_of(vm, child, CHILD_TASK));
+                let tasks = items(vm, pair.cdr).map(|child| field_of(vm, child, child::TASK));
                 holders.extend(tasks.filter_map(|task| number_of(vm, task)));
             }
             Some("SUSPENDED") => holders.extend(number_of(vm, pair.cdr)),

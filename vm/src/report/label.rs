@@ -6,6 +6,7 @@ use crate::datum;
 use crate::describe::describe;
 use crate::heap::{Heap, Kind};
 use crate::names::class;
+use crate::names::records::{child, claim, request, resource};
 use crate::task::{Task, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -110,10 +111,10 @@ fn changes_label(vm: &Vm, events: &[Value]) -> String {
 fn children_label(vm: &Vm, children: Value) -> String {
     let (mut running, mut due) = (Vec::new(), Vec::new());
     for child in items(vm, children) {
-        let name = describe(&vm.heap, field_of(vm, child, 0));
-        if field_of(vm, child, CHILD_TASK).is_true() {
+        let name = describe(&vm.heap, field_of(vm, child, child::ID));
+        if field_of(vm, child, child::TASK).is_true() {
             running.push(name);
-        } else if field_of(vm, child, CHILD_DUE).is_true() {
+        } else if field_of(vm, child, child::DUE).is_true() {
             due.push(name);
         }
     }
@@ -163,9 +164,9 @@ fn resources_label(vm: &Vm, resources: Value) -> String {
 
 fn resource_label(vm: &Vm, resource: Value) -> String {
     let field = |index| field_of(vm, resource, index);
-    let name = describe(&vm.heap, field(0));
-    let holders: Vec<String> = ring(vm, field(1))
-        .map(|claim| task_label(vm, field_of(vm, field_of(vm, claim, REQUEST), 0)))
+    let name = describe(&vm.heap, field(resource::NAME));
+    let holders: Vec<String> = ring(vm, field(resource::HOLDERS))
+        .map(|claim| task_label(vm, field_of(vm, field_of(vm, claim, claim::REQUEST), request::TASK)))
         .collect();
     if holders.is_empty() {
         format!("resource {name}")
@@ -174,24 +175,17 @@ fn resource_label(vm: &Vm, resource: Value) -> String {
     }
 }
 
-/// Field of a claim with its request.
-pub(super) const REQUEST: usize = 4;
-
-/// Fields of a supervisor's child with its task, and with the time of its restart.
-pub(super) const CHILD_TASK: usize = 6;
-const CHILD_DUE: usize = 8;
-
 /// Returns a field of a record of the library; `NIL` if there is none.
 pub(super) fn field_of(vm: &Vm, record: Value, index: usize) -> Value {
     vm.heap.vector(record).and_then(|fields| fields.get(index).copied()).unwrap_or(Value::NIL)
 }
 
-/// Returns the first records of a ring, each of which has the next one in its first field.
+/// Returns the first claims of a ring.
 pub(super) fn ring(vm: &Vm, first: Value) -> impl Iterator<Item = Value> {
     let mut next = first;
     let step = move || {
         let record = next;
-        next = field_of(vm, record, 0);
+        next = field_of(vm, record, claim::NEXT);
         if next == first {
             next = Value::NIL;
         }

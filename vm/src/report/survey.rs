@@ -18,6 +18,7 @@ use super::tasks::{is_of_library, number_of_owner, place_of, program_place};
 use super::{reason_of, task_label, variable_rows};
 use crate::describe::{describe, function_name};
 use crate::interp::frames::Frames;
+use crate::names::records::{lock, subscription};
 use crate::schedule::Due;
 use crate::table::Table;
 use crate::task::{Task, TaskState};
@@ -31,14 +32,6 @@ const LOCKS: usize = 500;
 const INPUTS: usize = 500;
 /// Facts on a page.
 const FACTS: usize = 500;
-
-/// Fields of a lock of a property, and of a subscription to one. `locks.esl` says what they are.
-const LOCK_KEY: usize = 0;
-const LOCK_VALUE: usize = 1;
-const LOCK_STATE: usize = 2;
-const LOCK_EVENT: usize = 4;
-const LOCK_SUBSCRIPTIONS: usize = 5;
-const SUBSCRIBER: usize = 0;
 
 impl Vm {
     /// Returns what there is to see of the run, while no task runs.
@@ -220,22 +213,24 @@ fn locks(vm: &Vm) -> impl Iterator<Item = Value> {
 /// Returns the owner of each lock that others may wait for, by the lock's event.
 pub(super) fn lock_owners(vm: &Vm) -> BTreeMap<u64, u64> {
     let owner = |lock: Value| {
-        let owner = items(vm, field_of(vm, lock, LOCK_SUBSCRIPTIONS)).next()?;
-        let number = number_of(vm, field_of(vm, owner, SUBSCRIBER))?;
-        Some((field_of(vm, lock, LOCK_EVENT).bits(), number))
+        let owner = items(vm, field_of(vm, lock, lock::SUBSCRIPTIONS)).next()?;
+        let number = number_of(vm, field_of(vm, owner, subscription::TASK))?;
+        Some((field_of(vm, lock, lock::EVENT).bits(), number))
     };
     locks(vm).take(LOCKS).filter_map(owner).collect()
 }
 
 fn lock_row(vm: &Vm, lock: Value) -> LockRow {
     let field = |index| field_of(vm, lock, index);
-    let subscriptions = items(vm, field(LOCK_SUBSCRIPTIONS));
-    let key = describe(&vm.heap, field(LOCK_KEY));
-    let value = describe(&vm.heap, field(LOCK_VALUE));
+    let subscriptions = items(vm, field(lock::SUBSCRIPTIONS));
+    let key = describe(&vm.heap, field(lock::KEY));
+    let value = describe(&vm.heap, field(lock::VALUE));
     LockRow {
         property: format!("{} {value})", key.strip_suffix(')').unwrap_or(&key)),
-        state: describe(&vm.heap, field(LOCK_STATE)).trim_start_matches(':').to_lowercase(),
-        subscribers: subscriptions.filter_map(|one| number_of(vm, field_of(vm, one, SUBSCRIBER))).collect(),
+        state: describe(&vm.heap, field(lock::STATE)).trim_start_matches(':').to_lowercase(),
+        subscribers: subscriptions
+            .filter_map(|one| number_of(vm, field_of(vm, one, subscription::TASK)))
+            .collect(),
     }
 }
 
