@@ -216,3 +216,17 @@ fn the_loop_has_an_arm_for_each_row_in_the_order_of_the_table() {
     assert_eq!(of_machine_code[2..], quick);
     assert_eq!(fused, FUSED.iter().map(|fused| fused.name).collect::<Vec<_>>());
 }
+
+/// Machine code has these instructions done by the function alone, as if their arm had run.
+#[test]
+#[cfg_attr(miri, ignore = "there is nothing unsafe in a text")]
+fn an_instruction_that_its_slow_half_does_has_no_more_in_its_arm() {
+    let source = include_str!("../mod.rs");
+    let done = OPCODES.iter().map(|row| row.opcode).filter(|opcode| opcode.is_done_by_slow_half());
+    let others: Vec<_> = done
+        .filter(|opcode| {
+            !source.contains(&format!("\n                LoopOperation::{opcode:?} => slow!({opcode:?}),\n"))
+        })
+        .collect();
+    assert_eq!(others, []);
+}
