@@ -11,8 +11,10 @@ use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
 
+use bytes::Bytes;
 use num_bigint::BigInt;
 
+use crate::packed::PackedVector;
 use crate::span::Span;
 use crate::symbol::Symbol;
 
@@ -45,6 +47,8 @@ pub enum DatumKind {
     Vector(Arc<[Datum]>),
     /// An array of a rank other than 1, its elements in row-major order.
     Array(Arc<[u32]>, Arc<[Datum]>),
+    /// A vector of numbers, from or for the host. No text denotes it.
+    Packed(PackedVector),
     /// Some object of the running program.
     Object(ObjectId),
     /// Something of the embedder's.
@@ -172,6 +176,11 @@ impl Datum {
     /// Returns a string.
     pub fn string(value: &str, span: Span) -> Datum {
         Datum::new(DatumKind::String(value.into()), span)
+    }
+
+    /// Returns a vector of bytes.
+    pub fn bytes(value: impl Into<Bytes>, span: Span) -> Datum {
+        Datum::new(DatumKind::Packed(PackedVector::Bytes(value.into())), span)
     }
 
     /// Returns a pair.
@@ -382,6 +391,7 @@ fn display(datum: &Datum, f: &mut fmt::Formatter<'_>, depth: u32) -> fmt::Result
         DatumKind::Character(c) => write!(f, "#\\{c}"),
         DatumKind::String(value) => write!(f, "{value:?}"),
         DatumKind::Object(ObjectId(id)) => write!(f, "#<object {id}>"),
+        DatumKind::Packed(vector) => write!(f, "{vector}"),
         DatumKind::Opaque(opaque) => write!(f, "{opaque}"),
         DatumKind::Call(call) => {
             f.write_str("#.")?;

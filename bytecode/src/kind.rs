@@ -117,7 +117,7 @@ impl ConstantClass {
             DatumKind::String(_) => ConstantClass::String,
             DatumKind::Symbol(_) => ConstantClass::Symbol,
             DatumKind::Cons(..) => ConstantClass::Pair,
-            DatumKind::Vector(_) => ConstantClass::Vector,
+            DatumKind::Vector(_) | DatumKind::Packed(_) => ConstantClass::Vector,
             _ => return None,
         })
     }

@@ -19,12 +19,14 @@ pub mod module;
 pub mod opcode;
 pub mod operand;
 pub mod package;
+pub mod packed;
 pub mod signature;
 pub mod span;
 pub mod symbol;
 pub mod verify;
 pub mod word;
 
+pub use bytes::Bytes;
 pub use num_bigint::BigInt;
 
 /// The example of the README, compiled and run.

@@ -105,6 +105,10 @@ impl Asked {
                 self.canary.mix_bytes(opaque.kind().as_bytes());
                 self.canary.mix_bytes(opaque.text().as_bytes());
             }
+            DatumKind::Packed(vector) => {
+                self.canary.mix(6);
+                self.canary.mix_bytes(&vector.to_le_bytes());
+            }
             _ => {
                 self.canary.mix(5);
                 self.canary.mix_bytes(datum.to_string().as_bytes());

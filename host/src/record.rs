@@ -10,7 +10,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use esl_bytecode::datum::Datum;
+use esl_bytecode::datum::{Datum, DatumKind};
 
 use super::{
     Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output, Permit,
@@ -53,9 +53,13 @@ impl QuestionHash {
     }
 
     pub(super) fn of_call(name: &str, arguments: &[Datum]) -> QuestionHash {
-        let texts: Vec<String> = arguments.iter().map(Datum::to_string).collect();
+        let contents = |argument: &Datum| match argument.kind() {
+            DatumKind::Packed(vector) => vector.to_le_bytes().into_owned(),
+            _ => argument.to_string().into_bytes(),
+        };
+        let contents: Vec<Vec<u8>> = arguments.iter().map(contents).collect();
         let mut parts = vec![name.as_bytes()];
-        parts.extend(texts.iter().map(String::as_bytes));
+        parts.extend(contents.iter().map(Vec::as_slice));
         QuestionHash::of(&parts)
     }
 }

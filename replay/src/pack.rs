@@ -10,6 +10,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
+use esl_bytecode::packed::PackedVector;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Home, Symbol};
 use num_bigint::BigInt;
@@ -101,6 +102,9 @@ mod tag {
     pub(super) const VECTOR: u8 = 9;
     pub(super) const ARRAY: u8 = 10;
     pub(super) const OPAQUE: u8 = 11;
+    pub(super) const BYTES: u8 = 12;
+    pub(super) const INTEGERS: u8 = 13;
+    pub(super) const FLOATS: u8 = 14;
 }
 
 /// Writes a node whose parts have these numbers.
@@ -154,6 +158,14 @@ fn node(out: &mut ByteWriter, kind: &DatumKind, number: &dyn Fn(&Datum) -> u64) 
             out.list(dimensions, |out, &dimension| out.number(u64::from(dimension)));
             out.list(items, |out, item| out.number(number(item)));
         }
+        DatumKind::Packed(vector) => {
+            out.byte(match vector {
+                PackedVector::Bytes(_) => tag::BYTES,
+                PackedVector::Integers(_) => tag::INTEGERS,
+                PackedVector::Floats(_) => tag::FLOATS,
+            });
+            out.bytes(&vector.to_le_bytes());
+        }
         DatumKind::Opaque(opaque) => {
             out.byte(tag::OPAQUE);
             out.text(opaque.kind());
@@ -164,6 +176,12 @@ fn node(out: &mut ByteWriter, kind: &DatumKind, number: &dyn Fn(&Datum) -> u64) 
             out.text("an object");
         }
     }
+}
+
+/// Returns the numbers that bytes hold, eight bytes each; `None` if they do not.
+fn words<T>(bytes: &[u8], number: fn([u8; 8]) -> T) -> Option<Arc<[T]>> {
+    let (words, rest) = bytes.as_chunks();
+    rest.is_empty().then(|| words.iter().map(|&word| number(word)).collect())
 }
 
 impl<'a> ByteReader<'a> {
@@ -273,6 +291,11 @@ impl<'a> ByteReader<'a> {
                 let fits = size == Some(items.len()) && dimensions.len() != 1 && dimensions.len() < 8;
                 fits.then_some(DatumKind::Array(dimensions.into(), items.into()))?
             }
+            tag::BYTES => DatumKind::Packed(PackedVector::Bytes(self.bytes()?.to_vec().into())),
+            tag::INTEGERS => {
+                DatumKind::Packed(PackedVector::Integers(words(self.bytes()?, i64::from_le_bytes)?))
+            }
+            tag::FLOATS => DatumKind::Packed(PackedVector::Floats(words(self.bytes()?, f64::from_le_bytes)?)),
             // The original is gone with its process; a new object stands for it.
             tag::OPAQUE => DatumKind::Opaque(OpaqueDatum::new(self.text()?, self.text()?, Arc::new(0_u8))),
             _ => return None,

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use esl::program::{Ended, Source, compile};
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::packed::PackedVector;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
 use esl_host::{
@@ -101,11 +102,17 @@ fn data() -> Vec<Datum> {
         datum(DatumKind::Float(-0.5)),
         datum(DatumKind::Character('λ')),
     ];
+    let packed = [
+        PackedVector::Bytes((0..=255).collect::<Vec<u8>>().into()),
+        PackedVector::Integers([i64::MIN, 0, i64::MAX].into()),
+        PackedVector::Floats([-0.0, f64::INFINITY, 1e300].into()),
+    ];
+    let packed = packed.map(|vector| datum(DatumKind::Packed(vector)));
     let vector = datum(DatumKind::Vector(vec![text.clone(), text.clone()].into()));
     let array = datum(DatumKind::Array(vec![1, 2].into(), numbers[..2].to_vec().into()));
     let symbols = [Symbol::new(&USER_PACKAGE.into(), "X"), Symbol::uninterned(3, "G"), Symbol::keyword("K")];
     let symbols = symbols.map(|symbol| Datum::symbol(symbol, Span::default()));
-    let all = numbers.into_iter().chain(symbols).chain([vector, array, Datum::nil(Span::default())]);
+    let all = numbers.into_iter().chain(symbols).chain([vector, array, Datum::nil(Span::default())]).chain(packed);
     vec![Datum::list_with_tail(all.collect::<Vec<_>>(), text, Span::default())]
 }
 

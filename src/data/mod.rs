@@ -12,9 +12,11 @@
 #[cfg(feature = "serde")]
 mod structure;
 
+mod convert;
 mod opaque;
 
 use std::fmt;
+use std::sync::Arc;
 
 use esl_bytecode::BigInt;
 use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
@@ -24,6 +26,9 @@ use esl_bytecode::symbol::Symbol;
 #[cfg(feature = "serde")]
 pub use structure::{Structure, StructureError};
 
+pub use convert::FromData;
+pub use esl_bytecode::Bytes;
+pub use esl_bytecode::packed::PackedVector;
 pub use opaque::{HostType, Opaque};
 
 /// A value from a program, or for one.
@@ -63,6 +68,9 @@ pub enum Data {
     DottedList(Vec<Data>, Box<Data>),
     /// A vector.
     Vector(Vec<Data>),
+    /// A vector of numbers: of bytes, if that is its element type, or of floats, if all elements are. `Vec<f64>`,
+    /// `Vec<u8>`, [`Bytes`] and others are made of it.
+    Packed(PackedVector),
     /// Something of the embedder's: an [`Opaque`] makes it, and is made of it.
     Opaque(OpaqueDatum),
 }
@@ -77,6 +85,21 @@ impl Data {
     pub fn list(items: impl IntoIterator<Item = Data>) -> Data {
         let items: Vec<Data> = items.into_iter().collect();
         if items.is_empty() { Data::Nil } else { Data::List(items) }
+    }
+
+    /// Returns the vector of these bytes.
+    pub fn bytes(bytes: impl Into<Bytes>) -> Data {
+        Data::Packed(PackedVector::Bytes(bytes.into()))
+    }
+
+    /// Returns the vector of these floats.
+    pub fn floats(floats: impl Into<Arc<[f64]>>) -> Data {
+        Data::Packed(PackedVector::Floats(floats.into()))
+    }
+
+    /// Returns the vector of these integers.
+    pub fn integers(integers: impl Into<Arc<[i64]>>) -> Data {
+        Data::Packed(PackedVector::Integers(integers.into()))
     }
 
     /// Returns whether the value counts as true: whether it is anything but `NIL`.
@@ -105,6 +128,22 @@ impl Data {
     pub fn as_str(&self) -> Option<&str> {
         match self {
             Data::String(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// Returns the bytes, if the value is a vector with that element type.
+    pub fn as_bytes(&self) -> Option<&Bytes> {
+        match self {
+            Data::Packed(PackedVector::Bytes(bytes)) => Some(bytes),
+            _ => None,
+        }
+    }
+
+    /// Returns the floats, if the value is a vector of one or more floats and nothing else.
+    pub fn as_floats(&self) -> Option<&[f64]> {
+        match self {
+            Data::Packed(PackedVector::Floats(floats)) => Some(floats),
             _ => None,
         }
     }
@@ -139,6 +178,7 @@ impl Data {
             Data::Vector(items) => {
                 DatumKind::Vector(items.iter().map(|item| item.to_datum(package)).collect())
             }
+            Data::Packed(vector) => DatumKind::Packed(vector.clone()),
             Data::Opaque(opaque) => DatumKind::Opaque(opaque.clone()),
         };
         Datum::new(kind, span)
@@ -162,6 +202,7 @@ impl Data {
             DatumKind::Vector(items) | DatumKind::Array(_, items) => {
                 Data::Vector(items.iter().map(Data::from_datum).collect())
             }
+            DatumKind::Packed(vector) => Data::Packed(vector.clone()),
             DatumKind::Opaque(opaque) => Data::Opaque(opaque.clone()),
             DatumKind::Object(_) | DatumKind::Call(_) => Data::String(datum.to_string()),
             DatumKind::Cons(..) => {
@@ -173,119 +214,6 @@ impl Data {
                 }
             }
         }
-    }
-}
-
-/// A type of Rust that arguments of functions of the embedder's can have.
-///
-/// ```
-/// use esl::data::FromData;
-/// use esl::{Data, Engine};
-///
-/// /// A length of the program's, which counts in metres.
-/// struct Centimetres(f64);
-///
-/// impl FromData for Centimetres {
-///     const TYPE: &'static str = "REAL";
-///
-///     fn from_data(data: &Data) -> Option<Centimetres> {
-///         f64::from_data(data).map(|metres| Centimetres(100.0 * metres))
-///     }
-/// }
-///
-/// let mut engine = Engine::new()?;
-/// engine.define("STEPS", "(length)", "The steps that a length takes.", |call| {
-///     let Centimetres(length) = call.get("length")?;
-///     Ok((length / 5.0) as i64)
-/// })?;
-/// assert_eq!(engine.eval("(steps 2.5)")?.as_integer(), Some(50));
-/// # Ok::<(), esl::Error>(())
-/// ```
-pub trait FromData: Sized {
-    /// Name of the type in `COMMON-LISP`, for failures.
-    const TYPE: &'static str;
-
-    /// Returns the value that data stand for; `None` if they are of another type.
-    fn from_data(data: &Data) -> Option<Self>;
-}
-
-/// Defines conversions for a type: its name in ESL, from data, and to data.
-macro_rules! convert {
-    ($( $ty:ty, $name:literal, |$data:ident| $from:expr, |$value:ident| $to:expr ; )*) => {
-        $(
-            impl FromData for $ty {
-                const TYPE: &'static str = $name;
-
-                fn from_data($data: &Data) -> Option<$ty> {
-                    $from
-                }
-            }
-
-            impl From<$ty> for Data {
-                fn from($value: $ty) -> Data {
-                    $to
-                }
-            }
-        )*
-    };
-}
-
-convert! {
-    i64, "INTEGER", |data| data.as_integer(), |value| Data::Integer(value);
-    i32, "INTEGER", |data| data.as_integer()?.try_into().ok(), |value| Data::Integer(value.into());
-    u32, "UNSIGNED-BYTE", |data| data.as_integer()?.try_into().ok(), |value| Data::Integer(value.into());
-    f64, "REAL", |data| data.as_float(), |value| Data::Float(value);
-    bool, "T", |data| Some(data.is_true()), |value| Data::boolean(value);
-    String, "STRING", |data| data.as_str().map(str::to_owned), |value| Data::String(value);
-    (), "NULL", |data| (!data.is_true()).then_some(()), |_value| Data::Nil;
-}
-
-impl FromData for Data {
-    const TYPE: &'static str = "T";
-
-    fn from_data(data: &Data) -> Option<Data> {
-        Some(data.clone())
-    }
-}
-
-/// `NIL` is `None`, so an optional argument needs no value to stand for its absence.
-impl<T: FromData> FromData for Option<T> {
-    const TYPE: &'static str = T::TYPE;
-
-    fn from_data(data: &Data) -> Option<Option<T>> {
-        if data.is_true() { T::from_data(data).map(Some) } else { Some(None) }
-    }
-}
-
-/// A list or a vector.
-impl<T: FromData> FromData for Vec<T> {
-    const TYPE: &'static str = "SEQUENCE";
-
-    fn from_data(data: &Data) -> Option<Vec<T>> {
-        let items = match data {
-            Data::Vector(items) => items,
-            list => list.as_list()?,
-        };
-        items.iter().map(T::from_data).collect()
-    }
-}
-
-impl From<&str> for Data {
-    fn from(value: &str) -> Data {
-        Data::String(value.to_owned())
-    }
-}
-
-impl<T: Into<Data>> From<Vec<T>> for Data {
-    /// Returns a list.
-    fn from(items: Vec<T>) -> Data {
-        Data::list(items.into_iter().map(Into::into))
-    }
-}
-
-impl<T: Into<Data>> From<Option<T>> for Data {
-    fn from(value: Option<T>) -> Data {
-        value.map_or(Data::Nil, Into::into)
     }
 }
 
@@ -312,6 +240,7 @@ impl fmt::Display for Data {
             Data::String(value) => write!(f, "\"{}\"", value.replace('\\', "\\\\").replace('"', "\\\"")),
             Data::Keyword(name) => write!(f, ":{name}"),
             Data::Symbol(name) => f.write_str(name),
+            Data::Packed(vector) => vector.fmt(f),
             Data::Opaque(opaque) => opaque.fmt(f),
             Data::List(items) => {
                 f.write_str("(")?;
@@ -348,9 +277,12 @@ mod tests {
             Data::Keyword("ON".into()),
             Data::Symbol("VALVE".into()),
             Data::Vector(vec![Data::Integer(1)]),
+            Data::bytes(vec![0, 255]),
+            Data::floats([0.5]),
+            Data::integers([-1]),
             Data::DottedList(vec![Data::Integer(1)], Box::new(Data::Integer(2))),
         ]);
         assert_eq!(Data::from_datum(&data.to_datum("ESL-USER")), data);
-        assert_eq!(data.to_string(), "(NIL T -5 1.5 #\\x \"a \\\"b\\\"\" :ON VALVE #(1) (1 . 2))");
+        assert_eq!(data.to_string(), "(NIL T -5 1.5 #\\x \"a \\\"b\\\"\" :ON VALVE #(1) #(0 255) #(0.5) #(-1) (1 . 2))");
     }
 }

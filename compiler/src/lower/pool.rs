@@ -124,7 +124,7 @@ impl Pool {
             DatumKind::String(text) => Constant::String(text.clone()),
             DatumKind::Object(id) => Constant::Object(*id),
             // Calls have been made before a form is compiled; what is the embedder's is in no form.
-            DatumKind::Call(_) | DatumKind::Opaque(_) => Constant::Nil,
+            DatumKind::Call(_) | DatumKind::Opaque(_) | DatumKind::Packed(_) => Constant::Nil,
             DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => {
                 unreachable!("compound data are handled by the caller")
             }
@@ -162,6 +162,7 @@ fn key(datum: &Datum) -> LiteralKey {
         | DatumKind::Vector(_)
         | DatumKind::Array(..)
         | DatumKind::Opaque(_)
+        | DatumKind::Packed(_)
         | DatumKind::Call(_) => LiteralKey::Node(datum.identity()),
     }
 }

@@ -87,6 +87,7 @@ fn print_one<'a>(
         DatumKind::Float(value) => write!(out, "#<float {value}>"),
         DatumKind::Object(ObjectId(id)) => write!(out, "#<object {id}>"),
         DatumKind::Opaque(opaque) => write!(out, "{opaque}"),
+        DatumKind::Packed(vector) => write!(out, "{vector}"),
         DatumKind::Call(call) => {
             out.push_str("#.");
             work.push(PrintStep::Datum(call, level, true));

@@ -1,5 +1,7 @@
 //! From data to structures.
 
+use esl_bytecode::packed::PackedVector;
+use serde::de::value::SeqDeserializer;
 use serde::de::{
     self, DeserializeSeed, EnumAccess, IntoDeserializer, MapAccess, SeqAccess, VariantAccess, Visitor,
 };
@@ -54,6 +56,18 @@ fn entry(pair: &Data) -> Option<(Data, Data)> {
     }
 }
 
+/// Has the elements of a vector of numbers visited.
+fn visit_packed<'de, V: Visitor<'de>>(
+    vector: &PackedVector,
+    visitor: V,
+) -> Result<V::Value, StructureError> {
+    match vector {
+        PackedVector::Bytes(bytes) => visitor.visit_seq(SeqDeserializer::new(bytes.iter().copied())),
+        PackedVector::Integers(integers) => visitor.visit_seq(SeqDeserializer::new(integers.iter().copied())),
+        PackedVector::Floats(floats) => visitor.visit_seq(SeqDeserializer::new(floats.iter().copied())),
+    }
+}
+
 impl<'de> de::Deserializer<'de> for Reading<'_> {
     type Error = StructureError;
 
@@ -77,6 +91,7 @@ impl<'de> de::Deserializer<'de> for Reading<'_> {
                 visitor.visit_string(field_name(self.0).unwrap_or_default())
             }
             Data::List(items) | Data::Vector(items) => visitor.visit_seq(Sequence(items.iter())),
+            Data::Packed(vector) => visit_packed(vector, visitor),
             Data::Ratio(..) | Data::DottedList(..) => self.is_not("a number or a list"),
             Data::Opaque(_) => self.is_not("data"),
         }
@@ -110,9 +125,10 @@ impl<'de> de::Deserializer<'de> for Reading<'_> {
     }
 
     fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, StructureError> {
-        match self.elements() {
-            Some(items) => visitor.visit_seq(Sequence(items.iter())),
-            None => self.is_not("a list or a vector"),
+        match (self.0, self.elements()) {
+            (Data::Packed(vector), _) => visit_packed(vector, visitor),
+            (_, Some(items)) => visitor.visit_seq(Sequence(items.iter())),
+            (_, None) => self.is_not("a list or a vector"),
         }
     }
 
@@ -134,11 +150,14 @@ impl<'de> de::Deserializer<'de> for Reading<'_> {
     }
 
     fn deserialize_bytes<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, StructureError> {
-        self.deserialize_seq(visitor)
+        match self.0 {
+            Data::Packed(PackedVector::Bytes(bytes)) => visitor.visit_bytes(bytes),
+            _ => self.deserialize_seq(visitor),
+        }
     }
 
     fn deserialize_byte_buf<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, StructureError> {
-        self.deserialize_seq(visitor)
+        self.deserialize_bytes(visitor)
     }
 
     fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, StructureError> {

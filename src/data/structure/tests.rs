@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::*;
 
@@ -78,4 +78,45 @@ fn association_lists_and_what_is_wrong() {
     assert_eq!(mode(Data::Symbol("IDLE".into())), Ok(Mode::Idle));
     assert!(mode(Data::list([key("DRIVE")])).is_err() && mode(key("FLY")).is_err());
     assert!(mode(Data::list([key("IDLE"), 1_i64.into()])).is_err());
+}
+
+/// Bytes that are serialized as such.
+#[derive(Debug, PartialEq)]
+struct Image(Vec<u8>);
+
+impl Serialize for Image {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_bytes(&self.0)
+    }
+}
+
+impl<'de> Deserialize<'de> for Image {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Image, D::Error> {
+        struct ImageVisitor;
+
+        impl serde::de::Visitor<'_> for ImageVisitor {
+            type Value = Image;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("bytes")
+            }
+
+            fn visit_bytes<E>(self, bytes: &[u8]) -> Result<Image, E> {
+                Ok(Image(bytes.to_vec()))
+            }
+        }
+
+        deserializer.deserialize_bytes(ImageVisitor)
+    }
+}
+
+#[test]
+fn bytes_and_vectors_of_numbers_are_read_as_such() {
+    let image = Image(vec![0, 255]);
+    let data = Data::from_structure(&image).expect("it is plain");
+    assert_eq!(data, Data::bytes(vec![0, 255]));
+    assert_eq!(data.to_structure::<Image>(), Ok(image));
+    assert_eq!(data.to_structure::<Vec<u16>>(), Ok(vec![0, 255]));
+    assert_eq!(Data::floats([0.5, 2.0]).to_structure::<Vec<f32>>(), Ok(vec![0.5, 2.0]));
+    assert!(Data::floats([0.5]).to_structure::<Vec<u8>>().is_err());
 }

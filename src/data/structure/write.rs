@@ -78,7 +78,7 @@ impl ser::Serializer for ToData {
         serialize_f64 f64 => |value| Data::Float(value);
         serialize_char char => |value| Data::Character(value);
         serialize_str &str => |value| Data::String(value.into());
-        serialize_bytes &[u8] => |value| Data::Vector(value.iter().map(|&byte| Data::Integer(byte.into())).collect());
+        serialize_bytes &[u8] => |value| Data::from(value);
     }
 
     fn serialize_none(self) -> Result<Data, StructureError> {

@@ -13,6 +13,7 @@
 //! with a text.
 
 mod environment;
+mod packed;
 mod walk;
 
 use std::collections::BTreeMap;
@@ -36,6 +37,9 @@ const MAX_NODES: usize = 4_000_000;
 
 /// Bytes of a node of a datum, and of what a unit and a walk remember about it.
 const NODE_BYTES: usize = 250;
+
+/// Bytes of a text that are moved in the time that a node takes.
+const BYTES_TOGETHER: usize = 16;
 
 /// Greatest number of objects whose data a unit remembers.
 const MAX_REMEMBERED: usize = 1 << 19;
@@ -230,7 +234,10 @@ impl Unit {
                         DatumKind::Call(call) => {
                             steps.extend([ToValue::Build(datum), ToValue::Visit(call)]);
                         }
-                        _ => made.push(self.atom_value(heap, names, datum)?),
+                        _ => {
+                            self.work += work_of(datum) as u64 - 1;
+                            made.push(self.atom_value(heap, names, datum)?);
+                        }
                     }
                 }
                 ToValue::Build(datum) => {
@@ -271,6 +278,7 @@ impl Unit {
             }
             DatumKind::Object(id) => self.pinned(*id).unwrap_or(Value::NIL),
             DatumKind::Opaque(opaque) => names.opaque_object(heap, opaque)?,
+            DatumKind::Packed(vector) => packed::value_of(heap, vector)?,
             DatumKind::Nil
             | DatumKind::Cons(..)
             | DatumKind::Vector(_)
@@ -463,13 +471,27 @@ pub(crate) fn export(heap: &Heap, names: &Names, value: Value) -> Result<(Datum,
     // An atom shares nothing with other parts, so it needs neither walk nor memory.
     let plain = || Some(Datum::new(plain_kind(heap, value)?, Span::default()));
     if let Some(datum) = names.opaque_of(heap, value).cloned().or_else(plain) {
-        return Ok((datum, 1));
+        let work = work_of(&datum);
+        return Ok((datum, work));
+    }
+    if let Some(vector) = packed::vector_of(heap, value)? {
+        let work = vector.work();
+        return Ok((Datum::new(DatumKind::Packed(vector), Span::default()), work));
     }
     let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
     if names.is_symbol(heap, value) {
         return Ok((unit.atom_datum(heap, names, value, Span::default()), 1));
     }
     Ok((unit.datum_of(heap, names, value, Span::default())?, unit.take_work() as usize))
+}
+
+/// Returns the work of moving a datum that is not compound.
+fn work_of(datum: &Datum) -> usize {
+    match datum.kind() {
+        DatumKind::String(text) => 1 + text.len() / BYTES_TOGETHER,
+        DatumKind::Packed(vector) => vector.work(),
+        _ => 1,
+    }
 }
 
 /// Returns data as a value, and the work that it took.
@@ -482,11 +504,11 @@ pub(crate) fn import(
     datum: &Datum,
 ) -> Result<(Value, usize), AllocError> {
     if let DatumKind::String(text) = datum.kind() {
-        return Ok((heap.alloc_str(text)?, 1));
+        return Ok((heap.alloc_str(text)?, work_of(datum)));
     }
     let mut unit = Unit::default();
     if !datum.is_compound() {
-        return Ok((unit.atom_value(heap, names, datum)?, 1));
+        return Ok((unit.atom_value(heap, names, datum)?, work_of(datum)));
     }
     Ok((unit.value_of(heap, names, datum)?, unit.take_work() as usize))
 }

@@ -3,7 +3,7 @@
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 
-use super::{DatumError, MAX_NODES, NODE_BYTES, Unit};
+use super::{DatumError, MAX_NODES, NODE_BYTES, Unit, packed};
 use crate::heap::layout::Array;
 use crate::heap::{Heap, Kind};
 use crate::names::load::integer_of;
@@ -140,6 +140,13 @@ impl DatumWalk {
                     }
                     if self.wholes.contains(&object.bits()) {
                         self.made.push(Datum::new(DatumKind::Object(unit.pin(object)), span));
+                        continue;
+                    }
+                    if unit.is_for_embedder
+                        && let Some(vector) = packed::vector_of(heap, object).map_err(WalkError::Datum)?
+                    {
+                        unit.work += vector.work() as u64 - 1;
+                        self.made.push(Datum::new(DatumKind::Packed(vector), span));
                         continue;
                     }
                     let Some(parts) = parts_of(heap, object) else {
