@@ -24,8 +24,9 @@ pub enum PackedVector {
     Floats(Arc<[f64]>),
 }
 
-/// Elements that are moved in the time that one element of another sequence takes.
-const MOVED_TOGETHER: usize = 8;
+/// Units of work, of which the machine counts 64 as a tick, for an element that becomes a value or is made of
+/// one. Two bytes are moved in the time of one unit.
+const ELEMENT_WORK: usize = 4;
 
 /// Elements that are displayed at most.
 const DISPLAY_LENGTH: usize = 1000;
@@ -45,11 +46,11 @@ impl PackedVector {
         self.len() == 0
     }
 
-    /// Returns the work of moving the elements into a program or out of it, in elements of a sequence.
+    /// Returns the units of work of moving the elements into a program or out of it.
     pub fn work(&self) -> usize {
         match self {
-            PackedVector::Bytes(bytes) => 1 + bytes.len() / MOVED_TOGETHER,
-            _ => 1 + self.len(),
+            PackedVector::Bytes(bytes) => 1 + bytes.len() / 2,
+            _ => 1 + ELEMENT_WORK * self.len(),
         }
     }
 

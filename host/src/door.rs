@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::{Poll, Waker};
 
 use esl_bytecode::datum::Datum;
 
@@ -50,7 +51,33 @@ struct Door {
 #[derive(Default)]
 struct DoorTable {
     doors: BTreeMap<String, Door>,
+    /// Drivers that wait for room.
+    wakers: Vec<Waker>,
     is_closed: bool,
+}
+
+/// How a driver sends a signal.
+pub(super) struct DoorEntry<'a> {
+    /// Most signals that are on their way.
+    pub(super) limit: Option<usize>,
+    /// Woken when there may be room.
+    pub(super) waker: Option<&'a Waker>,
+}
+
+impl DoorTable {
+    /// Counts a signal that may be sent to the input.
+    fn enter(&mut self, name: &str, limit: Option<usize>) -> Result<(), SendError> {
+        if self.is_closed {
+            return Err(SendError::Ended);
+        }
+        let Some(door) = self.doors.get_mut(name) else { return Err(SendError::NoSuchInput(name.into())) };
+        let has_room = door.capacity.is_none_or(|capacity| door.kept + door.sent < capacity);
+        if !has_room || limit.is_some_and(|limit| door.sent >= limit) {
+            return Err(SendError::Full(name.into()));
+        }
+        door.sent += 1;
+        Ok(())
+    }
 }
 
 /// The doors of one machine.
@@ -68,30 +95,50 @@ impl Doors {
     }
 
     fn change(&self, name: &str, change: impl FnOnce(&mut Door)) {
-        if let Some(door) = self.state().doors.get_mut(name) {
-            change(door);
-        }
+        self.change_table(|table| {
+            if let Some(door) = table.doors.get_mut(name) {
+                change(door);
+            }
+        });
+    }
+
+    /// Changes the table, and has everybody look who waits for room.
+    fn change_table(&self, change: impl FnOnce(&mut DoorTable)) {
+        let wakers = {
+            let mut table = self.state();
+            change(&mut table);
+            std::mem::take(&mut table.wakers)
+        };
         self.room.notify_all();
+        wakers.into_iter().for_each(Waker::wake);
     }
 
     /// Waits until a signal may be sent to the input, if `waits`, and counts it.
     fn enter(&self, name: &str, waits: bool) -> Result<(), SendError> {
-        let mut state = self.state();
+        let mut table = self.state();
         loop {
-            if state.is_closed {
-                return Err(SendError::Ended);
+            match table.enter(name, None) {
+                Err(SendError::Full(_)) if waits => {
+                    table = self.room.wait(table).unwrap_or_else(PoisonError::into_inner);
+                }
+                entered => return entered,
             }
-            let Some(door) = state.doors.get_mut(name) else {
-                return Err(SendError::NoSuchInput(name.into()));
-            };
-            if door.capacity.is_none_or(|capacity| door.kept + door.sent < capacity) {
-                door.sent += 1;
-                return Ok(());
+        }
+    }
+
+    /// As [`Doors::enter`], for a driver, which is woken when there may be room.
+    pub(super) fn poll_enter(&self, name: &str, entry: DoorEntry<'_>) -> Poll<Result<(), SendError>> {
+        let mut table = self.state();
+        match table.enter(name, entry.limit) {
+            Err(SendError::Full(_)) => {
+                if let Some(waker) = entry.waker
+                    && !table.wakers.iter().any(|known| known.will_wake(waker))
+                {
+                    table.wakers.push(waker.clone());
+                }
+                Poll::Pending
             }
-            if !waits {
-                return Err(SendError::Full(name.into()));
-            }
-            state = self.room.wait(state).unwrap_or_else(PoisonError::into_inner);
+            entered => Poll::Ready(entered),
         }
     }
 }
@@ -107,8 +154,7 @@ impl Inbox {
     /// Says that the input is no more.
     #[doc(hidden)]
     pub fn remove_door(&self, name: &str) {
-        self.doors().state().doors.remove(name);
-        self.doors().room.notify_all();
+        self.doors().change_table(|table| _ = table.doors.remove(name));
     }
 
     /// Says that a signal that was sent to the input has come.
@@ -126,8 +172,7 @@ impl Inbox {
     /// Says that the machine is gone.
     #[doc(hidden)]
     pub fn close_doors(&self) {
-        self.doors().state().is_closed = true;
-        self.doors().room.notify_all();
+        self.doors().change_table(|table| table.is_closed = true);
     }
 }
 

@@ -7,6 +7,8 @@
 //! | `virtual_host` | [`VirtualHost`]: an outside in memory, whose time passes only in waits |
 //! | `record`, `replay` | [`RecordingHost`] and [`ReplayHost`]: the answers of a host, kept and given again |
 //! | `inbox`, `signal` | [`Inbox`]: unrequested events, from any thread; the signals of the process |
+//! | `function`, `argument`, `value` | [`HostRows`]: functions of the host, each declared once, with typed arguments and values |
+//! | `input` | [`HostInput`]: an input that a driver signals, which waits for room |
 //! | `door` | [`Sender`]: signals of inputs, with a limit on the unread ones |
 //! | `operation` | [`HostOperation`]: work of the outside for a task, and its end |
 //! | `question` | [`Question`]: calls, evaluations and commands for a run, and their answers |
@@ -25,16 +27,19 @@
 //! machine asks for a permit before each request that needs a right, and the host carries out the permitted
 //! request. [`VirtualHost`] has only the files that it was given.
 //!
-//! Not here: the machine, and the functions that an embedder adds to it.
+//! Not here: the machine, and the functions themselves.
 
 #![forbid(unsafe_code)]
 
+mod argument;
 mod asked;
 mod canary;
 mod console;
 mod door;
+mod function;
 mod host;
 mod inbox;
+mod input;
 mod look;
 mod operation;
 mod question;
@@ -47,14 +52,21 @@ mod rights;
 mod shared;
 mod signal;
 mod task_tree;
+mod value;
 mod virtual_host;
 
+pub use argument::{ArgumentList, ArgumentReader, FromArgument, FromCall, Payload};
 pub use door::{SendError, Sender};
+pub use function::{
+    BeginFuture, Completion, DataFunction, Handler, HostFunction, HostModule, HostRow, HostRows, Need,
+    OperationFuture, definitions,
+};
 pub use host::{
     Awaited, FileAnswer, FileRequest, Host, HostError, HostState, Input, Output, RunCheck, VIRTUAL_BEGINNING,
     Wake, WriteMode,
 };
 pub use inbox::{Inbox, Incoming};
+pub use input::HostInput;
 pub use look::{
     FailureFrame, FailureRow, FrameRow, FrameVariable, InputRow, Lateness, LockRow, Look, RelationRow,
     RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
@@ -66,6 +78,7 @@ pub use record::{NotedRecord, QuestionHash, Record, Recorder, Recording, Recordi
 pub use replay::{Divergence, ReplayHost};
 pub use rights::{Permit, Right, Rights};
 pub use signal::ProcessSignal;
+pub use value::{HostHandle, HostObject, IntoDatum, IntoValues, Keyword, Values};
 pub use virtual_host::{Captured, VirtualHost};
 
 /// The names that only a machine needs.

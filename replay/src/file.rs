@@ -35,7 +35,7 @@ use super::records::{self, Before};
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
 /// The version of the format that this library reads and writes.
-pub const FORMAT: u32 = 4;
+pub const FORMAT: u32 = 5;
 
 /// Length of what is before the content of a frame.
 const FRAME: usize = 11;

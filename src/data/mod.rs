@@ -68,8 +68,8 @@ pub enum Data {
     DottedList(Vec<Data>, Box<Data>),
     /// A vector.
     Vector(Vec<Data>),
-    /// A vector of numbers: of bytes, if that is its element type, or of floats, if all elements are. `Vec<f64>`,
-    /// `Vec<u8>`, [`Bytes`] and others are made of it.
+    /// A vector of numbers: of bytes, if that is its element type, or of floats, if all elements are.
+    /// `Vec<f64>`, `Vec<u8>`, [`Bytes`] and others are made of it.
     Packed(PackedVector),
     /// Something of the embedder's: an [`Opaque`] makes it, and is made of it.
     Opaque(OpaqueDatum),
@@ -283,6 +283,9 @@ mod tests {
             Data::DottedList(vec![Data::Integer(1)], Box::new(Data::Integer(2))),
         ]);
         assert_eq!(Data::from_datum(&data.to_datum("ESL-USER")), data);
-        assert_eq!(data.to_string(), "(NIL T -5 1.5 #\\x \"a \\\"b\\\"\" :ON VALVE #(1) #(0 255) #(0.5) #(-1) (1 . 2))");
+        assert_eq!(
+            data.to_string(),
+            "(NIL T -5 1.5 #\\x \"a \\\"b\\\"\" :ON VALVE #(1) #(0 255) #(0.5) #(-1) (1 . 2))"
+        );
     }
 }

@@ -48,9 +48,8 @@ impl Failure {
 
     /// Creates the failure of code of the embedder's that has panicked.
     pub(super) fn of_panic(panic: &(dyn Any + Send)) -> Failure {
-        let text = panic.downcast_ref::<&str>().map(ToString::to_string);
-        let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-        Failure::new("HOST-PANIC", text.map(Data::String))
+        let failure = host::HostFailure::of_panic(panic);
+        Failure::new(failure.cause, failure.arguments.iter().map(Data::from_datum))
     }
 
     pub(super) fn to_host(&self) -> host::HostFailure {

@@ -29,7 +29,7 @@ use std::sync::Arc;
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
-use esl_host::{Host, RealHost};
+use esl_host::{Host, HostRows, Inbox, RealHost};
 use esl_vm::embed::HostFunction;
 use esl_vm::run::CallError;
 use esl_vm::value::Value;
@@ -116,7 +116,7 @@ impl Engine {
         F: FnMut(Call) -> Result<V, Failure> + Send + 'static,
         V: Into<Data>,
     {
-        self.define_by(name, lambda_list, documentation, "NIL", |names| {
+        self.define_by(name, lambda_list, documentation, false, |names| {
             HostFunction::AtOnce(Box::new(move |arguments| {
                 let arguments = arguments.iter().map(Data::from_datum).collect();
                 let call = Call { names: names.clone(), arguments };
@@ -178,7 +178,7 @@ impl Engine {
     where
         F: FnMut(Operation) + Send + 'static,
     {
-        self.define_by(name, lambda_list, documentation, "T", |names| {
+        self.define_by(name, lambda_list, documentation, true, |names| {
             HostFunction::Operation(Box::new(move |operation| {
                 let operation = Operation::new(operation, names.clone());
                 // A panic drops the operation, which is how the program hears of it.
@@ -196,24 +196,68 @@ impl Engine {
         self.eval(&format!("(esl::%detach '{name})")).map(drop)
     }
 
+    /// Defines the functions that rows declare: `make` makes these for the inbox of this engine. Their code
+    /// takes arguments by types, and may take inputs of the program, which it signals from other threads.
+    ///
+    /// ```
+    /// use esl::Engine;
+    /// use esl::host::{HostFailure, HostRows};
+    ///
+    /// let mut engine = Engine::new()?;
+    /// engine.define_rows(|inbox| {
+    ///     let mut rows = HostRows::new(inbox);
+    ///     rows.at_once("OPEN-VALVE", ["number"], "Opens a valve.", |number: u16| {
+    ///         if number > 3 { Err(HostFailure::new("VALVE-STUCK", number)) } else { Ok(number) }
+    ///     });
+    ///     rows
+    /// })?;
+    /// assert_eq!(engine.eval("(open-valve 2)")?.as_integer(), Some(2));
+    /// let stuck = "(handler-case (open-valve 7) (failure (f) (failure-cause f)))";
+    /// assert_eq!(engine.eval(stuck)?.to_string(), ":VALVE-STUCK");
+    /// # Ok::<(), esl::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Engine::define`].
+    pub fn define_rows(&mut self, make: impl FnOnce(&Inbox) -> HostRows) -> Result<(), Error> {
+        for row in make(&self.machine.inbox()) {
+            let lambda_list = format!("({})", row.parameters.join(" "));
+            self.define_name(row.name, &lambda_list, row.documentation, row.waits())?;
+            self.machine.add_host_row(row);
+        }
+        Ok(())
+    }
+
     /// Defines a function of the embedder's, which `make` makes for the variables of its lambda list.
     fn define_by(
         &mut self,
         name: &str,
         lambda_list: &str,
         documentation: &str,
-        is_operation: &str,
+        waits: bool,
         make: impl FnOnce(Arc<[String]>) -> HostFunction,
     ) -> Result<(), Error> {
-        check_name(name)?;
-        let documentation = documentation.replace('\\', "\\\\").replace('"', "\\\"");
-        let definition =
-            format!("(esl::%define-host-function {name} {lambda_list} \"{documentation}\" {is_operation})");
-        let names = self.eval(&definition)?;
-        let names = names.as_list().unwrap_or_default().iter();
-        let names = names.map(|name| name.as_str().unwrap_or_default().to_lowercase()).collect();
+        let names = self.define_name(name, lambda_list, documentation, waits)?;
         self.machine.add_host_function(&name.to_uppercase(), make(names));
         Ok(())
+    }
+
+    /// Defines a function of the host for programs. Returns the variables of its lambda list, in lower case.
+    fn define_name(
+        &mut self,
+        name: &str,
+        lambda_list: &str,
+        documentation: &str,
+        waits: bool,
+    ) -> Result<Arc<[String]>, Error> {
+        check_name(name)?;
+        let waits = if waits { "T" } else { "NIL" };
+        let documentation = documentation.replace('\\', "\\\\").replace('"', "\\\"");
+        let definition =
+            format!("(esl::%define-host-function {name} {lambda_list} \"{documentation}\" {waits})");
+        let names = self.eval(&definition)?;
+        let names = names.as_list().unwrap_or_default().iter();
+        Ok(names.map(|name| name.as_str().unwrap_or_default().to_lowercase()).collect())
     }
 
     /// Evaluates the forms of a text one after another, and returns the first value of the last form.

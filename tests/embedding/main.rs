@@ -4,6 +4,7 @@ mod loops;
 mod operations;
 mod questions;
 mod things;
+mod vectors;
 
 use std::time::Duration;
 

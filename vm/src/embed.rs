@@ -31,7 +31,7 @@ use crate::vm::Vm;
 use crate::wait::event;
 
 pub use crate::datum::DatumError as ExportError;
-pub use crate::outside::{DataFunction, HostFunction, Need};
+pub use esl_host::{DataFunction, HostFunction, HostRow, Need};
 
 /// Reason why a function of the library could not be called.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -181,6 +181,11 @@ impl Vm {
     /// As [`Vm::add_host_function`]; a call fails unless the program has the rights that the function needs.
     pub fn add_guarded_function(&mut self, name: &str, function: HostFunction, needs: &[Need]) {
         self.outside.functions.insert(name.into(), Given { function, needs: needs.to_vec() });
+    }
+
+    /// Adds a function of the host that a row declares, in place of an earlier one of its name.
+    pub fn add_host_row(&mut self, row: HostRow) {
+        self.add_guarded_function(row.name, row.function, &row.needs);
     }
 
     /// Returns the functions of the embedder's: their names,

@@ -2,7 +2,8 @@
 
 use esl_bytecode::datum::Datum;
 
-use crate::data::{nil, text, text_of_bytes};
+use esl_bytecode::Bytes;
+use esl_host::IntoDatum;
 
 /// What has been read and the program has not taken.
 #[derive(Default)]
@@ -47,9 +48,9 @@ impl Arrived {
         &self.bytes[self.taken..]
     }
 
-    /// Returns what there is if nothing can be taken: `NIL` at the end.
-    fn nothing(&self) -> Datum {
-        if self.is_ended { nil() } else { text("") }
+    /// Returns what there is if nothing can be taken: `NIL` at the end, otherwise no text or no bytes.
+    fn nothing(&self, none: impl IntoDatum) -> Datum {
+        if self.is_ended { ().into_datum() } else { none.into_datum() }
     }
 
     /// Takes so many bytes, of which `make` makes data.
@@ -69,13 +70,13 @@ impl Arrived {
         let rest = self.rest();
         if rest.is_empty() {
             self.is_new = false;
-            return self.nothing();
+            return self.nothing("");
         }
         let line = if by_line { rest.iter().position(|&byte| byte == b'\n') } else { None };
         let whole = if self.is_ended { rest.len() } else { whole_characters(rest) };
         let count = line.map_or(whole, |line| line + 1);
         self.is_new = line.is_some() && count < rest.len();
-        self.take(count, |bytes| text(&String::from_utf8_lossy(bytes)))
+        self.take(count, text)
     }
 
     /// Takes whole lines of ASCII text if there are some, otherwise whole characters up to the first line
@@ -87,27 +88,32 @@ impl Arrived {
         match plain.iter().rposition(|&byte| byte == b'\n') {
             Some(end) => {
                 self.is_new = end + 1 < rest.len();
-                self.take(end + 1, |bytes| text(&String::from_utf8_lossy(bytes)))
+                self.take(end + 1, text)
             }
             None => self.take_text(true),
         }
     }
 
-    /// Takes at most so many bytes, as a string. `NIL` at the end.
+    /// Takes at most so many bytes. `NIL` at the end.
     pub(crate) fn take_bytes(&mut self, limit: usize) -> Datum {
         let rest = self.rest();
         if rest.is_empty() {
             self.is_new = false;
-            return self.nothing();
+            return self.nothing(Bytes::new());
         }
         let count = rest.len().min(limit);
         self.is_new = count < rest.len();
-        self.take(count, text_of_bytes)
+        self.take(count, |bytes| Bytes::copy_from_slice(bytes).into_datum())
     }
 }
 
+/// Returns the text of bytes in UTF-8.
+fn text(bytes: &[u8]) -> Datum {
+    String::from_utf8_lossy(bytes).as_ref().into_datum()
+}
+
 /// Returns the length of a text without the character at its end of which a part is missing.
-pub(crate) fn whole_characters(bytes: &[u8]) -> usize {
+fn whole_characters(bytes: &[u8]) -> usize {
     for back in 1..=bytes.len().min(3) {
         let byte = bytes[bytes.len() - back];
         if byte & 0xC0 != 0x80 {
@@ -126,7 +132,14 @@ pub(crate) fn whole_characters(bytes: &[u8]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::text_of;
+    use esl_bytecode::datum::DatumKind;
+
+    fn text_of(datum: &Datum) -> Option<&str> {
+        match datum.kind() {
+            DatumKind::String(text) => Some(text),
+            _ => None,
+        }
+    }
 
     #[test]
     fn lines_of_ascii_are_taken_together_and_others_one_by_one() {
@@ -158,7 +171,7 @@ mod tests {
         assert_eq!(taken(arrived.take_text(true)).as_deref(), Some(""));
         arrived.add("one\ntwo\n\u{20AC}".as_bytes());
         assert_eq!(taken(arrived.take_text(true)).as_deref(), Some("one\n"));
-        assert_eq!(taken(arrived.take_bytes(2)).as_deref(), Some("tw"));
+        assert_eq!(arrived.take_bytes(2).to_string(), "#(116 119)");
         assert_eq!(taken(arrived.take_text(false)).as_deref(), Some("o\n\u{20AC}"));
         assert!(!arrived.is_something());
         arrived.add(&"\u{20AC}".as_bytes()[..1]);

@@ -20,7 +20,6 @@
 #![forbid(unsafe_code)]
 
 mod arrived;
-mod data;
 mod event_loop;
 mod file;
 #[cfg(feature = "http")]
@@ -49,23 +48,10 @@ pub use tls::{PemFault, TlsError, TlsIdentity, begin_tls};
 /// Gives a machine the modules, for `require`, and what they need of the process itself.
 pub fn install_modules(machine: &mut Vm) {
     modules::install(machine);
-    os::install(machine);
-    #[cfg(feature = "http")]
-    http::install_conversions(machine);
 }
 
 /// Gives a machine the operations of the modules, which reach the real world. Without them calls fail with
 /// `:NOT-IN-THIS-WORLD`.
 pub fn install_operations(machine: &mut Vm) {
-    os::install_clock(machine);
-    file::install(machine);
-    let sockets = socket::Sockets::default();
-    process::install(machine, &sockets);
-    socket::install(machine, &sockets);
-    #[cfg(feature = "http")]
-    http::install(machine);
-    #[cfg(feature = "mqtt")]
-    mqtt::install(machine);
-    #[cfg(feature = "watch")]
-    watch::install(machine);
+    modules::install_operations(machine);
 }

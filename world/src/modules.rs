@@ -1,45 +1,86 @@
-//! The modules' texts, and how a machine finds them.
+//! The modules: their texts, the functions of the host that they call, and how a machine finds both.
 
-use esl_bytecode::datum::Datum;
-use esl_bytecode::span::Span;
-use esl_vm::embed::HostFunction;
+use esl_host::{HostModule, HostRows, Inbox, definitions};
 use esl_vm::vm::Vm;
 
-use crate::data::text_of;
+use crate::{file, os, process, socket};
 
-/// The modules, by name.
-const MODULES: &[(&str, &str)] = &[
+/// Returns no functions.
+fn none(inbox: &Inbox) -> HostRows {
+    HostRows::new(inbox)
+}
+
+/// The modules.
+const MODULES: &[HostModule] = &[
     #[cfg(feature = "http")]
-    ("http", include_str!("../modules/http.esl")),
-    ("json", include_str!("../modules/json.esl")),
-    ("log", include_str!("../modules/log.esl")),
+    HostModule { name: "http", text: include_str!("../modules/http.esl"), rows: crate::http::rows },
+    HostModule { name: "json", text: include_str!("../modules/json.esl"), rows: none },
+    HostModule { name: "log", text: include_str!("../modules/log.esl"), rows: none },
     #[cfg(feature = "mqtt")]
-    ("mqtt", include_str!("../modules/mqtt.esl")),
-    ("os", include_str!("../modules/os.esl")),
-    ("process", include_str!("../modules/process.esl")),
+    HostModule { name: "mqtt", text: include_str!("../modules/mqtt.esl"), rows: crate::mqtt::rows },
+    HostModule { name: "os", text: include_str!("../modules/os.esl"), rows: os::rows },
+    HostModule { name: "process", text: include_str!("../modules/process.esl"), rows: process::rows },
     #[cfg(feature = "serial")]
-    ("serial", include_str!("../modules/serial.esl")),
-    ("sockets", include_str!("../modules/sockets.esl")),
-    ("time", include_str!("../modules/time.esl")),
+    HostModule { name: "serial", text: include_str!("../modules/serial.esl"), rows: crate::serial::rows },
+    HostModule { name: "sockets", text: include_str!("../modules/sockets.esl"), rows: socket::rows },
+    HostModule { name: "time", text: include_str!("../modules/time.esl"), rows: os::clock_rows },
 ];
+
+/// Functions that the library itself calls, by their names.
+const OF_THE_LIBRARY: &[fn(&Inbox) -> HostRows] = &[
+    file::rows,
+    #[cfg(feature = "watch")]
+    crate::watch::rows,
+];
+
+fn find(name: &str) -> Option<&'static HostModule> {
+    MODULES.iter().find(|module| module.name.eq_ignore_ascii_case(name))
+}
 
 /// Returns the text of the module of this name, in any case.
 pub fn module(name: &str) -> Option<&'static str> {
-    MODULES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|&(_, text)| text)
+    find(name).map(|module| module.text)
 }
 
 /// Returns the names of the modules.
 pub fn module_names() -> impl Iterator<Item = &'static str> {
-    MODULES.iter().map(|&(name, _)| name)
+    MODULES.iter().map(|module| module.name)
 }
 
-/// Has `require` find the modules when the program runs.
+/// Has `require` find the modules when the program runs, and their texts find the functions that they call.
+/// Adds the functions that reach nothing outside.
 pub(crate) fn install(machine: &mut Vm) {
-    let text = |arguments: &[Datum]| {
-        let text = arguments.first().and_then(text_of).and_then(module);
-        Ok(text.map_or_else(|| Datum::nil(Span::default()), |text| Datum::string(text, Span::default())))
-    };
-    machine.add_host_function("%MODULE-TEXT", HostFunction::AtOnce(Box::new(text)));
+    let inbox = machine.inbox();
+    let mut rows = HostRows::new(&inbox);
+    rows.at_once("%MODULE-TEXT", ["name"], "Returns the text of a module, or NIL.", |name: String| {
+        Ok(module(&name))
+    });
+    let for_definitions = inbox.clone();
+    rows.at_once(
+        "%HOST-FUNCTIONS",
+        ["name"],
+        "Returns the definitions of the functions that a module calls.",
+        move |name: String| {
+            let module = find(&name);
+            Ok(module.map(|module| definitions(&(module.rows)(&for_definitions))))
+        },
+    );
+    rows.into_iter().for_each(|row| machine.add_host_row(row));
+    let everywhere = all_rows(&inbox).filter(|row| row.is_everywhere);
+    everywhere.for_each(|row| machine.add_host_row(row));
+}
+
+/// Adds the functions that reach the real world.
+pub(crate) fn install_operations(machine: &mut Vm) {
+    let inbox = machine.inbox();
+    let outside = all_rows(&inbox).filter(|row| !row.is_everywhere);
+    outside.for_each(|row| machine.add_host_row(row));
+}
+
+/// Returns the functions of all modules and of the library.
+fn all_rows(inbox: &Inbox) -> impl Iterator<Item = esl_host::HostRow> {
+    let makers = OF_THE_LIBRARY.iter().copied().chain(MODULES.iter().map(|module| module.rows));
+    makers.flat_map(move |rows| rows(inbox))
 }
 
 #[cfg(test)]
@@ -48,10 +89,25 @@ mod tests {
 
     #[test]
     fn modules_begin_with_a_package_of_their_name() {
-        for (name, text) in MODULES {
+        for HostModule { name, text, .. } in MODULES {
             assert!(text.contains(&format!("(defpackage :{name}\n")), "{name}");
             assert!(module(&name.to_uppercase()).is_some());
         }
         assert!(module("none").is_none());
+    }
+
+    #[test]
+    fn every_function_of_the_host_is_called_by_its_module() {
+        for HostModule { name, text, rows } in MODULES {
+            let rows = rows(&Inbox::new());
+            let defines = text.contains(&format!("(esl::%define-host-functions \"{name}\")"));
+            assert_eq!(defines, rows.iter().next().is_some(), "{name}");
+            for row in rows.iter() {
+                let call = row.name.to_lowercase();
+                let is_called = MODULES.iter().any(|module| module.text.contains(&call));
+                assert!(is_called, "{}", row.name);
+                assert!(row.documentation.ends_with('.'), "{}", row.name);
+            }
+        }
     }
 }

@@ -4,19 +4,12 @@ use std::future::Future;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
 
-use esl_bytecode::datum::Datum;
-use esl_host::{HostFailure, HostOperation};
-use esl_vm::embed::{HostFunction, Need};
-use esl_vm::vm::Vm;
+use esl_host::{ArgumentReader, Completion, FromCall, HostFailure, HostOperation, OperationFuture};
 use tokio::sync::oneshot;
 
-use crate::data::{CallArguments, failure};
-use crate::event_loop::{self, NoEventLoop, Stoppable};
+use crate::event_loop::{self, Stoppable};
 
-/// What an operation comes to.
-pub(crate) type Completion = Result<Vec<Datum>, HostFailure>;
-
-/// Told when the program has cancelled an operation.
+/// Tells a function that the program has cancelled its operation.
 pub(crate) struct Cancelled(oneshot::Receiver<()>);
 
 impl Cancelled {
@@ -29,8 +22,41 @@ impl Cancelled {
     }
 }
 
-/// A future of an operation.
-pub(crate) type OperationFuture = Pin<Box<dyn Future<Output = Completion> + Send>>;
+/// For an operation that is begun by [`to_its_end`].
+impl FromCall for Cancelled {
+    const COUNT: usize = 0;
+
+    fn from_call(call: &mut ArgumentReader<'_>) -> Result<Cancelled, HostFailure> {
+        let (cancel, cancelled) = oneshot::channel();
+        if let Some(operation) = call.operation() {
+            operation.on_cancel(move || _ = cancel.send(()));
+        }
+        Ok(Cancelled(cancelled))
+    }
+}
+
+/// Begins an operation as a task of the event loop. A call that is left drops the future, and is over then.
+pub(crate) fn spawned(operation: HostOperation, future: OperationFuture) {
+    let (cancel, cancelled) = oneshot::channel();
+    operation.on_cancel(move || _ = cancel.send(()));
+    let begun = BegunOperation::new(future, operation);
+    // Without the event loop the operation is dropped, which is how the program hears of it.
+    _ = event_loop::spawn(UnderWay { begun, cancelled: Some(cancelled) });
+}
+
+/// As [`spawned`], of an operation that is often over at once, and no part of which the system may delay. It
+/// is begun by the thread of the machine, and goes on in the one that has what it waits for, so that neither
+/// takes a way through another thread.
+pub(crate) fn ready_soon(operation: HostOperation, future: OperationFuture) {
+    // As above.
+    _ = event_loop::begin(BegunOperation::new(future, operation));
+}
+
+/// Begins an operation that itself sees to its end when it is cancelled: its code takes [`Cancelled`].
+pub(crate) fn to_its_end(operation: HostOperation, future: OperationFuture) {
+    // As above.
+    _ = event_loop::spawn(BegunOperation::new(future, operation));
+}
 
 /// An operation that was begun. There may be very many, so it is no larger than it has to be.
 struct BegunOperation {
@@ -55,7 +81,7 @@ impl BegunOperation {
     }
 
     fn cancel(&mut self) {
-        self.end(Err(failure("CANCELLED", "")));
+        self.end(Err(HostFailure::new("CANCELLED", "")));
     }
 }
 
@@ -86,7 +112,7 @@ impl Stoppable for BegunOperation {
 /// An operation that is a task of the event loop.
 struct UnderWay {
     begun: BegunOperation,
-    /// Told when the operation is cancelled, unless the future sees to that itself.
+    /// Told when the operation is cancelled.
     cancelled: Option<oneshot::Receiver<()>>,
 }
 
@@ -105,59 +131,4 @@ impl Future for UnderWay {
         }
         Pin::new(&mut self.begun).poll(context)
     }
-}
-
-/// Gives a machine an operation. A call that is left drops the future, and is over then.
-pub(crate) fn define<F, R>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
-where
-    F: FnMut(CallArguments) -> R + Send + 'static,
-    R: Future<Output = Completion> + Send + 'static,
-{
-    add(machine, name, needs, move |mut operation| {
-        let cancelled = Some(listen(&operation));
-        let future = Box::pin(function(CallArguments(operation.take_arguments())));
-        event_loop::spawn(UnderWay { begun: BegunOperation::new(future, operation), cancelled })
-    });
-}
-
-/// As [`define`], of an operation that is often over at once, and no part of which the system may delay. It
-/// is begun by the thread of the machine, and goes on in the one that has what it waits for, so that neither
-/// takes a way through another thread.
-pub(crate) fn define_ready<F>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
-where
-    F: FnMut(CallArguments) -> OperationFuture + Send + 'static,
-{
-    add(machine, name, needs, move |mut operation| {
-        let future = function(CallArguments(operation.take_arguments()));
-        event_loop::begin(BegunOperation::new(future, operation))
-    });
-}
-
-/// Gives a machine an operation that itself sees to its end when it is cancelled.
-pub(crate) fn define_with_end<F, R>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
-where
-    F: FnMut(CallArguments, Cancelled) -> R + Send + 'static,
-    R: Future<Output = Completion> + Send + 'static,
-{
-    add(machine, name, needs, move |mut operation| {
-        let cancelled = Cancelled(listen(&operation));
-        let future = Box::pin(function(CallArguments(operation.take_arguments()), cancelled));
-        event_loop::spawn(BegunOperation::new(future, operation))
-    });
-}
-
-/// Returns what is told when the operation is cancelled.
-fn listen(operation: &HostOperation) -> oneshot::Receiver<()> {
-    let (cancel, cancelled) = oneshot::channel();
-    operation.on_cancel(move || _ = cancel.send(()));
-    cancelled
-}
-
-fn add<F>(machine: &mut Vm, name: &str, needs: &[Need], mut begin: F)
-where
-    F: FnMut(HostOperation) -> Result<(), NoEventLoop> + Send + 'static,
-{
-    // Without the event loop the operation is dropped, which is how the program hears of it.
-    let begin = move |operation: HostOperation| _ = begin(operation);
-    machine.add_guarded_function(name, HostFunction::Operation(Box::new(begin)), needs);
 }

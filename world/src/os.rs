@@ -2,44 +2,36 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use esl_bytecode::datum::{Datum, DatumKind};
-use esl_bytecode::span::Span;
-use esl_host::{HostFailure, Right};
-use esl_vm::embed::{HostFunction, Need};
-use esl_vm::vm::Vm;
+use esl_host::{HostRows, Inbox, Right};
 
-use crate::data::{CallArguments, integer, nil, text};
-
-/// Gives a machine functions about the process.
-pub(crate) fn install(machine: &mut Vm) {
-    let mut define =
-        |name: &str, function: fn(CallArguments) -> Result<Datum, HostFailure>, needs: &[Need]| {
-            let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()));
-            machine.add_guarded_function(name, HostFunction::AtOnce(Box::new(function)), needs);
-        };
-    define("%OS-GETENV", getenv, &[Need { right: Right::Env, argument: 0 }]);
-    define("%OS-HOSTNAME", |_| Ok(text(&host_name())), &[]);
-    define("%OS-PROCESS-ID", |_| Ok(integer(std::process::id())), &[]);
+/// Returns the functions of `:os`.
+pub(crate) fn rows(inbox: &Inbox) -> HostRows {
+    let mut rows = HostRows::new(inbox);
+    rows.at_once("%OS-GETENV", ["name"], "Returns the value of a variable of the environment.", getenv)
+        .needs(Right::Env, "name")
+        .everywhere();
+    rows.at_once("%OS-HOSTNAME", [], "Returns the name of the machine.", || Ok(host_name())).everywhere();
+    rows.at_once("%OS-PROCESS-ID", [], "Returns the number of the process.", || Ok(std::process::id()))
+        .everywhere();
+    rows
 }
 
-/// Gives a machine the real time of day.
-pub(crate) fn install_clock(machine: &mut Vm) {
-    let now = |_: &[Datum]| {
+/// Returns the functions of `:time`.
+pub(crate) fn clock_rows(inbox: &Inbox) -> HostRows {
+    let mut rows = HostRows::new(inbox);
+    rows.at_once("%TIME-NOW", [], "Returns the seconds since 1970, UTC.", || {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
-        let seconds =
-            since.map_or_else(|before| -before.duration().as_secs_f64(), |after| after.as_secs_f64());
-        Ok(Datum::new(DatumKind::Float(seconds), Span::default()))
-    };
-    machine.add_host_function("%TIME-NOW", HostFunction::AtOnce(Box::new(now)));
+        Ok(since.map_or_else(|before| -before.duration().as_secs_f64(), |after| after.as_secs_f64()))
+    });
+    rows
 }
 
-fn getenv(arguments: CallArguments) -> Result<Datum, HostFailure> {
-    let name = arguments.text(0)?;
+fn getenv(name: String) -> Result<Option<String>, esl_host::HostFailure> {
     // The system has no variables of other names.
     if name.is_empty() || name.contains(['=', '\0']) {
-        return Ok(nil());
+        return Ok(None);
     }
-    Ok(std::env::var_os(name).map_or_else(nil, |value| text(&value.to_string_lossy())))
+    Ok(std::env::var_os(name).map(|value| value.to_string_lossy().into_owned()))
 }
 
 #[cfg(unix)]

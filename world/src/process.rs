@@ -3,24 +3,20 @@
 //! A program that is run is stopped when its call is left: by SIGTERM, and by SIGKILL if it has not ended
 //! within [`GRACE`]. The call is over when the program is.
 
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 use std::time::Duration;
 
-use esl_bytecode::datum::Datum;
-use esl_host::{HostFailure, Right};
-use esl_vm::embed::{HostFunction, Need};
-use esl_vm::vm::Vm;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_host::{FromArgument, HostFailure, HostHandle, HostObject, HostRows, Inbox, IntoDatum, Right};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
 use tokio::process::{Child, Command};
 use tokio::sync::{mpsc, watch};
 
-use crate::data::{CallArguments, boolean, failure, integer, nil, text};
 use crate::event_loop;
-use crate::operation::{Cancelled, Completion, define, define_with_end};
-use crate::socket::{Connection, Sockets};
+use crate::operation::{Cancelled, spawned, to_its_end};
+use crate::socket::{Connection, Socket, lock};
 
 /// Time that a program has between SIGTERM and SIGKILL.
 const GRACE: Duration = Duration::from_secs(2);
@@ -42,53 +38,130 @@ enum StopRequest {
     AtOnce,
 }
 
-/// The launched programs of a machine, by number.
-#[derive(Clone, Default)]
-struct Programs(Arc<Mutex<HashMap<i64, Launched>>>);
+/// A program of the program's; nothing before it is launched.
+#[derive(Default)]
+struct ChildProcess(Mutex<Option<Launched>>);
 
-impl Programs {
-    fn lock(&self) -> MutexGuard<'_, HashMap<i64, Launched>> {
-        // The table is whole at every moment, so a panic elsewhere does not corrupt it.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+impl HostObject for ChildProcess {
+    const KIND: &'static str = "PROCESS";
+}
 
-    fn get(&self, number: i64) -> Result<Launched, HostFailure> {
-        self.lock().get(&number).cloned().ok_or_else(|| failure("PROCESS-ERROR", "there is no such process"))
-    }
-
-    fn add(&self, launched: Launched) -> i64 {
-        let mut programs = self.lock();
-        let number = programs.len() as i64 + 1;
-        programs.insert(number, launched);
-        number
+impl ChildProcess {
+    fn get(&self) -> Result<Launched, HostFailure> {
+        lock(&self.0).clone().ok_or_else(|| process_failure("there is no such process"))
     }
 }
 
-/// Gives a machine the operations of `:process`.
-pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
-    let needs = [Need { right: Right::Run, argument: 0 }];
-    define_with_end(machine, "%PROCESS-RUN", &needs, run);
-    let programs = Programs::default();
-    let (known, sockets) = (programs.clone(), sockets.clone());
-    define(machine, "%PROCESS-LAUNCH", &needs, move |arguments| {
-        launch(arguments, known.clone(), sockets.clone())
+fn process_failure(reason: impl ToString) -> HostFailure {
+    HostFailure::new("PROCESS-ERROR", reason)
+}
+
+/// Where the output of a launched program goes: to the connection that a socket becomes, nowhere for `NIL`,
+/// and for anything else to where that of this process goes.
+enum OutputTarget {
+    Nowhere,
+    Inherited,
+    Socket(HostHandle<Socket>),
+}
+
+impl FromArgument for OutputTarget {
+    const TYPE: &'static str = "T";
+
+    fn from_argument(datum: &Datum) -> Result<OutputTarget, HostFailure> {
+        match datum.kind() {
+            DatumKind::Nil => Ok(OutputTarget::Nowhere),
+            DatumKind::Opaque(_) => HostHandle::from_argument(datum).map(OutputTarget::Socket),
+            _ => Ok(OutputTarget::Inherited),
+        }
+    }
+}
+
+impl OutputTarget {
+    fn stdio(&self) -> Stdio {
+        match self {
+            OutputTarget::Nowhere => Stdio::null(),
+            OutputTarget::Inherited => Stdio::inherit(),
+            OutputTarget::Socket(_) => Stdio::piped(),
+        }
+    }
+
+    /// Has the socket be what comes out of a pipe. If it was closed meanwhile, the pipe is closed too.
+    fn take(self, pipe: Option<impl AsyncRead + Send + Unpin + 'static>) {
+        if let (OutputTarget::Socket(socket), Some(pipe)) = (self, pipe) {
+            _ = socket.set((Connection::over(pipe, tokio::io::empty()), 0, String::new()));
+        }
+    }
+}
+
+/// Returns the functions of `:process`.
+pub(crate) fn rows(inbox: &Inbox) -> HostRows {
+    let mut rows = HostRows::new(inbox);
+    rows.operation(
+        to_its_end,
+        "%PROCESS-RUN",
+        ["program", "arguments", "input", "output", "error-output", "directory", "environment"],
+        "Runs a program to its end. Returns its output and its error output, if they are wanted, and its exit status.",
+        |cancelled: Cancelled,
+         program: String,
+         arguments: Vec<String>,
+         input: Option<String>,
+         output: bool,
+         errors: bool,
+         directory: Option<String>,
+         environment: Vec<(String, String)>| {
+            async move {
+                let command = command(&program, &arguments, directory, environment)?;
+                run(cancelled, program, command, input, output, errors).await
+            }
+        },
+    )
+    .needs(Right::Run, "program");
+    let mut made = 0;
+    rows.at_once("%PROCESS-NEW", [], "Returns a process that is not launched.", move || {
+        made += 1;
+        Ok(HostHandle::new(made, ChildProcess::default()))
     });
-    let known = programs.clone();
-    define(machine, "%PROCESS-WAIT", &[], move |arguments| {
-        let launched = arguments.integer(0).and_then(|number| known.get(number));
-        async move { Ok(vec![integer(status_of(launched?).await)]) }
-    });
-    let known = programs.clone();
-    define(machine, "%PROCESS-END", &[], move |arguments| {
-        let launched = arguments.integer(0).and_then(|number| known.get(number));
-        async move { Ok(vec![integer(end(launched?).await)]) }
-    });
-    let alive = move |arguments: &[Datum]| {
-        let launched = programs.get(CallArguments(arguments.to_vec()).integer(0)?)?;
-        let is_alive = launched.status.borrow().is_none();
-        Ok(boolean(is_alive))
-    };
-    machine.add_host_function("%PROCESS-ALIVE", HostFunction::AtOnce(Box::new(alive)));
+    rows.operation(
+        spawned,
+        "%PROCESS-LAUNCH",
+        ["program", "arguments", "process", "input", "output", "error-output", "directory", "environment"],
+        "Launches a program as PROCESS, with sockets for its streams. Returns the number that the system has for it.",
+        |name: String,
+         arguments: Vec<String>,
+         program: HostHandle<ChildProcess>,
+         input: Option<HostHandle<Socket>>,
+         output: OutputTarget,
+         errors: OutputTarget,
+         directory: Option<String>,
+         environment: Vec<(String, String)>| {
+            async move {
+                let command = command(&name, &arguments, directory, environment)?;
+                launch(name, command, program, input, output, errors)
+            }
+        },
+    )
+    .needs(Right::Run, "program");
+    rows.operation(
+        spawned,
+        "%PROCESS-WAIT",
+        ["process"],
+        "Waits until PROCESS has ended. Returns its exit status.",
+        |program: HostHandle<ChildProcess>| async move { Ok(status_of(program.get()?).await) },
+    );
+    rows.operation(
+        spawned,
+        "%PROCESS-END",
+        ["process"],
+        "Ends PROCESS. Returns its exit status.",
+        |program: HostHandle<ChildProcess>| async move { Ok(end(program.get()?).await) },
+    );
+    rows.at_once(
+        "%PROCESS-ALIVE",
+        ["process"],
+        "Returns whether PROCESS has not ended.",
+        |program: HostHandle<ChildProcess>| Ok(program.get()?.status.borrow().is_none()),
+    );
+    rows
 }
 
 /// Returns the path of a program, found as a shell would. The environment that the program is given plays no
@@ -115,18 +188,21 @@ fn is_executable(path: &Path) -> bool {
     path.is_file()
 }
 
-/// Returns the command of a call whose arguments begin with the program and its arguments, and have the
-/// folder and the environment from `index` on.
-fn command(arguments: &CallArguments, index: usize) -> Result<Command, HostFailure> {
-    let name = arguments.text(0)?;
-    let unknown = || failure("PROCESS-ERROR", format!("there is no program `{name}`"));
-    let mut command = Command::new(find_program(&name).ok_or_else(unknown)?);
+/// Returns the command that runs a program.
+fn command(
+    name: &str,
+    arguments: &[String],
+    directory: Option<String>,
+    environment: Vec<(String, String)>,
+) -> Result<Command, HostFailure> {
+    let unknown = || process_failure(format!("there is no program `{name}`"));
+    let mut command = Command::new(find_program(name).ok_or_else(unknown)?);
     // What is in the arguments is the program's; only its own name tells it under which it was called.
     #[cfg(unix)]
-    command.arg0(&name);
-    command.args(arguments.texts(1)?).envs(arguments.pairs(index + 1)?);
-    if let Some(folder) = arguments.text_if_any(index)? {
-        command.current_dir(folder);
+    command.arg0(name);
+    command.args(arguments).envs(environment);
+    if let Some(directory) = directory {
+        command.current_dir(directory);
     }
     Ok(command)
 }
@@ -137,7 +213,7 @@ fn start(mut command: Command, name: &str) -> Result<Child, HostFailure> {
         let folder = command.as_std().get_current_dir().filter(|folder| !folder.is_dir());
         let place =
             folder.map_or(String::new(), |folder| format!(" in {}, which is no folder", folder.display()));
-        failure("PROCESS-ERROR", format!("`{name}` cannot be run{place}: {error}"))
+        process_failure(format!("`{name}` cannot be run{place}: {error}"))
     })
 }
 
@@ -154,14 +230,16 @@ fn status_number(status: ExitStatus) -> i32 {
     status.code().unwrap_or(-1)
 }
 
-/// `%PROCESS-RUN`: program, arguments, input, whether output and error output are wanted, folder,
-/// environment.
-async fn run(arguments: CallArguments, mut cancelled: Cancelled) -> Completion {
-    let name = arguments.text(0)?;
-    let input = arguments.text_if_any(2)?;
-    let mut command = command(&arguments, 5)?;
-    command.stdin(pipe_if(input.is_some())).stdout(pipe_if(arguments.is_true(3)));
-    command.stderr(pipe_if(arguments.is_true(4)));
+/// Runs a program to its end.
+async fn run(
+    mut cancelled: Cancelled,
+    name: String,
+    mut command: Command,
+    input: Option<String>,
+    wants_output: bool,
+    wants_errors: bool,
+) -> Result<(Datum, Datum, i32), HostFailure> {
+    command.stdin(pipe_if(input.is_some())).stdout(pipe_if(wants_output)).stderr(pipe_if(wants_errors));
     let mut child = start(command, &name)?;
     let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
     let feed = async move {
@@ -173,12 +251,12 @@ async fn run(arguments: CallArguments, mut cancelled: Cancelled) -> Completion {
     let work = async {
         let ((), output, errors) = tokio::join!(feed, text_from(stdout), text_from(stderr));
         let (output, errors) = (output?, errors?);
-        let status = child.wait().await.map_err(|error| failure("PROCESS-ERROR", error))?;
-        Ok(vec![output, errors, integer(status_number(status))])
+        let status = child.wait().await.map_err(process_failure)?;
+        Ok((output, errors, status_number(status)))
     };
     let answer = tokio::select! {
         biased;
-        () = cancelled.wait() => Err(failure("CANCELLED", "")),
+        () = cancelled.wait() => Err(HostFailure::new("CANCELLED", "")),
         answer = work => answer,
     };
     if answer.is_err() {
@@ -189,15 +267,15 @@ async fn run(arguments: CallArguments, mut cancelled: Cancelled) -> Completion {
 
 /// Reads all that a program writes. `NIL` if nobody wants it.
 async fn text_from(pipe: Option<impl AsyncRead + Unpin>) -> Result<Datum, HostFailure> {
-    let Some(pipe) = pipe else { return Ok(nil()) };
+    let Some(pipe) = pipe else { return Ok(().into_datum()) };
     let mut bytes = Vec::new();
     let read = pipe.take(MOST_OUTPUT + 1).read_to_end(&mut bytes).await;
-    read.map_err(|error| failure("PROCESS-ERROR", error))?;
+    read.map_err(process_failure)?;
     if bytes.len() as u64 > MOST_OUTPUT {
         let reason = format!("it has written more than {} MiB", MOST_OUTPUT >> 20);
-        return Err(failure("OUTPUT-TOO-LONG", reason));
+        return Err(HostFailure::new("OUTPUT-TOO-LONG", reason));
     }
-    Ok(text(&String::from_utf8_lossy(&bytes)))
+    Ok(String::from_utf8_lossy(&bytes).as_ref().into_datum())
 }
 
 /// Ends a program, and waits until it has ended.
@@ -225,38 +303,24 @@ fn terminate(child: &mut Child) {
     drop(child.start_kill());
 }
 
-/// Where the output of a launched program goes: to the connection of a number, nowhere for `NIL`, and for
-/// anything else to where that of this process goes.
-fn output_of(arguments: &CallArguments, index: usize) -> (Stdio, Option<i64>) {
-    match arguments.number(index) {
-        Ok(number) => (Stdio::piped(), Some(number)),
-        Err(_) if arguments.is_true(index) => (Stdio::inherit(), None),
-        Err(_) => (Stdio::null(), None),
-    }
-}
-
-/// `%PROCESS-LAUNCH`: program, arguments, the number of a connection for its input or `NIL`, where output and
-/// error output go, folder, environment.
-async fn launch(arguments: CallArguments, programs: Programs, sockets: Sockets) -> Completion {
-    let name = arguments.text(0)?;
-    let mut command = command(&arguments, 5)?;
-    let input = if arguments.is_true(2) { Some(arguments.number(2)?) } else { None };
-    let ((output, output_number), (errors, errors_number)) =
-        (output_of(&arguments, 3), output_of(&arguments, 4));
-    command.stdin(pipe_if(input.is_some())).stdout(output).stderr(errors);
+/// Launches a program. Returns the number that the system has for it.
+fn launch(
+    name: String,
+    mut command: Command,
+    program: HostHandle<ChildProcess>,
+    input: Option<HostHandle<Socket>>,
+    output: OutputTarget,
+    errors: OutputTarget,
+) -> Result<u32, HostFailure> {
+    command.stdin(pipe_if(input.is_some())).stdout(output.stdio()).stderr(errors.stdio());
     let mut child = start(command, &name)?;
-    let none = tokio::io::empty;
-    // A number may have been closed meanwhile; then the pipe is closed too.
-    if let (Some(number), Some(pipe)) = (input, child.stdin.take()) {
-        _ = sockets.set(number, Connection::over(none(), pipe), 0, String::new());
+    // If the socket was closed meanwhile, the pipe is closed too.
+    if let (Some(socket), Some(pipe)) = (input, child.stdin.take()) {
+        _ = socket.set((Connection::over(tokio::io::empty(), pipe), 0, String::new()));
     }
-    if let (Some(number), Some(pipe)) = (output_number, child.stdout.take()) {
-        _ = sockets.set(number, Connection::over(pipe, none()), 0, String::new());
-    }
-    if let (Some(number), Some(pipe)) = (errors_number, child.stderr.take()) {
-        _ = sockets.set(number, Connection::over(pipe, none()), 0, String::new());
-    }
-    let number = integer(child.id().unwrap_or(0));
+    output.take(child.stdout.take());
+    errors.take(child.stderr.take());
+    let number = child.id().unwrap_or(0);
     let (status_sender, status) = watch::channel(None);
     let (end, mut ends) = mpsc::unbounded_channel();
     let watch = async move {
@@ -272,8 +336,9 @@ async fn launch(arguments: CallArguments, programs: Programs, sockets: Sockets) 
         // Nobody may be left who wants to know.
         _ = status_sender.send(Some(status.map_or(-1, status_number)));
     };
-    event_loop::spawn(watch).map_err(|reason| failure("PROCESS-ERROR", reason))?;
-    Ok(vec![integer(programs.add(Launched { status, end })), number])
+    event_loop::spawn(watch).map_err(process_failure)?;
+    *lock(&program.0) = Some(Launched { status, end });
+    Ok(number)
 }
 
 /// Waits until a launched program has ended, and returns its exit status.

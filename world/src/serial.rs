@@ -1,78 +1,108 @@
 //! Serial lines, as connections.
 
-use esl_host::HostFailure;
+use esl_bytecode::datum::Datum;
+use esl_host::{FromArgument, HostFailure, HostHandle, HostRows, Inbox, Right};
 use tokio_serial::{DataBits, FlowControl, Parity, SerialPortBuilder, SerialPortBuilderExt, StopBits};
 
-use crate::data::{CallArguments, failure, integer};
-use crate::operation::Completion;
-use crate::socket::{Connection, Sockets};
+use crate::operation::spawned;
+use crate::socket::{Connection, Socket};
 
-fn serial_failure(reason: impl ToString) -> HostFailure {
-    failure("SERIAL-ERROR", reason)
+/// Defines settings of a port, as arguments: what each datum, in print, stands for.
+macro_rules! settings {
+    ($( $name:ident($ty:ident), $type:literal { $( $datum:literal => $value:ident ),* } )*) => {
+        $(
+            struct $name($ty);
+
+            impl FromArgument for $name {
+                const TYPE: &'static str = $type;
+
+                fn from_argument(datum: &Datum) -> Result<$name, HostFailure> {
+                    match datum.to_string().as_str() {
+                        $( $datum => Ok($name($ty::$value)), )*
+                        _ => Err(HostFailure::of_type(datum, $type)),
+                    }
+                }
+            }
+        )*
+    };
 }
 
-/// `%SERIAL-OPEN`: number, path, baud, data bits, parity, stop bits, flow control.
-pub(crate) async fn open(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
-    let port = settings(&arguments)?.open_native_async();
-    let port = port.map_err(|error| serial_failure(format!("`{path}` cannot be opened: {error}")))?;
+settings! {
+    DataBitsArgument(DataBits), "INTEGER" { "5" => Five, "6" => Six, "7" => Seven, "8" => Eight }
+    ParityArgument(Parity), "KEYWORD" { ":NONE" => None, ":ODD" => Odd, ":EVEN" => Even }
+    StopBitsArgument(StopBits), "INTEGER" { "1" => One, "2" => Two }
+    FlowControlArgument(FlowControl), "KEYWORD" {
+        ":NONE" => None, ":SOFTWARE" => Software, ":HARDWARE" => Hardware
+    }
+}
+
+/// Returns the functions of `:serial`.
+pub(crate) fn rows(inbox: &Inbox) -> HostRows {
+    let mut rows = HostRows::new(inbox);
+    // A port may take its time.
+    rows.operation(
+        spawned,
+        "%SERIAL-OPEN",
+        ["socket", "path", "baud", "data-bits", "parity", "stop-bits", "flow-control"],
+        "Has SOCKET be the serial port PATH.",
+        |socket: HostHandle<Socket>,
+         path: String,
+         baud: u32,
+         DataBitsArgument(data_bits): DataBitsArgument,
+         ParityArgument(parity): ParityArgument,
+         StopBitsArgument(stop_bits): StopBitsArgument,
+         FlowControlArgument(flow_control): FlowControlArgument| {
+            let port = tokio_serial::new(&path, baud).data_bits(data_bits).parity(parity);
+            let port = port.stop_bits(stop_bits).flow_control(flow_control);
+            async move { open(socket, path, port) }
+        },
+    )
+    .needs(Right::Serial, "path");
+    rows
+}
+
+fn open(socket: HostHandle<Socket>, path: String, port: SerialPortBuilder) -> Result<(), HostFailure> {
+    let port = port
+        .open_native_async()
+        .map_err(|error| HostFailure::new("SERIAL-ERROR", format!("`{path}` cannot be opened: {error}")))?;
     let (reader, writer) = tokio::io::split(port);
-    sockets.set(number, Connection::over(reader, writer), 0, path)?;
-    Ok(vec![integer(number)])
-}
-
-/// Returns the port that is to be opened, with its settings.
-fn settings(arguments: &CallArguments) -> Result<SerialPortBuilder, HostFailure> {
-    let path = arguments.text(1)?;
-    let baud = u32::try_from(arguments.integer(2)?).map_err(serial_failure)?;
-    let data_bits = match arguments.integer(3)? {
-        5 => DataBits::Five,
-        6 => DataBits::Six,
-        7 => DataBits::Seven,
-        _ => DataBits::Eight,
-    };
-    let parity = match arguments.text(4)?.as_str() {
-        "ODD" => Parity::Odd,
-        "EVEN" => Parity::Even,
-        _ => Parity::None,
-    };
-    let stop_bits = if arguments.integer(5)? == 2 { StopBits::Two } else { StopBits::One };
-    let flow_control = match arguments.text(6)?.as_str() {
-        "SOFTWARE" => FlowControl::Software,
-        "HARDWARE" => FlowControl::Hardware,
-        _ => FlowControl::None,
-    };
-    let port = tokio_serial::new(path, baud).data_bits(data_bits).parity(parity).stop_bits(stop_bits);
-    Ok(port.flow_control(flow_control))
+    socket.set((Connection::over(reader, writer), 0, path))
 }
 
 #[cfg(test)]
 mod tests {
-    use esl_bytecode::datum::Datum;
+    use esl_bytecode::span::Span;
+    use esl_bytecode::symbol::Symbol;
+    use esl_host::IntoDatum;
 
     use super::*;
-    use crate::data::text;
 
     #[test]
-    fn each_setting_reaches_the_port() {
-        let call = |baud, data_bits, parity, stop_bits, flow: &str| -> Vec<Datum> {
-            let (baud, data_bits, stop_bits) = (integer(baud), integer(data_bits), integer(stop_bits));
-            vec![integer(1), text("/dev/a"), baud, data_bits, text(parity), stop_bits, text(flow)]
-        };
-        let port = tokio_serial::new("/dev/a", 9600);
-        let bits = [DataBits::Five, DataBits::Six, DataBits::Seven, DataBits::Eight];
-        for (number, data_bits) in (5..).zip(bits) {
-            for (parity_name, parity) in
-                [("NONE", Parity::None), ("ODD", Parity::Odd), ("EVEN", Parity::Even)]
-            {
-                let call = call(9600, number, parity_name, 1, "SOFTWARE");
-                let expected = port.clone().data_bits(data_bits).parity(parity);
-                let expected = expected.stop_bits(StopBits::One).flow_control(FlowControl::Software);
-                assert_eq!(settings(&CallArguments(call)).ok(), Some(expected));
-            }
+    fn each_setting_stands_for_that_of_the_port() {
+        let keyword = |name: &str| Datum::symbol(Symbol::keyword(name), Span::default());
+        for (bits, expected) in
+            (5_i64..).zip([DataBits::Five, DataBits::Six, DataBits::Seven, DataBits::Eight])
+        {
+            let found = DataBitsArgument::from_argument(&bits.into_datum());
+            assert!(found.is_ok_and(|found| found.0 == expected), "{bits}");
         }
-        let call_of_two = call(4_000_000, 8, "NONE", 2, "HARDWARE");
-        let expected = port.baud_rate(4_000_000).stop_bits(StopBits::Two).flow_control(FlowControl::Hardware);
-        assert_eq!(settings(&CallArguments(call_of_two)).ok(), Some(expected));
+        for (name, expected) in [("NONE", Parity::None), ("ODD", Parity::Odd), ("EVEN", Parity::Even)] {
+            let found = ParityArgument::from_argument(&keyword(name));
+            assert!(found.is_ok_and(|found| found.0 == expected), "{name}");
+        }
+        for (bits, expected) in (1_i64..).zip([StopBits::One, StopBits::Two]) {
+            let found = StopBitsArgument::from_argument(&bits.into_datum());
+            assert!(found.is_ok_and(|found| found.0 == expected), "{bits}");
+        }
+        for (name, expected) in [
+            ("NONE", FlowControl::None),
+            ("SOFTWARE", FlowControl::Software),
+            ("HARDWARE", FlowControl::Hardware),
+        ] {
+            let found = FlowControlArgument::from_argument(&keyword(name));
+            assert!(found.is_ok_and(|found| found.0 == expected), "{name}");
+        }
+        assert!(DataBitsArgument::from_argument(&9_i64.into_datum()).is_err());
+        assert!(ParityArgument::from_argument(&keyword("MARK")).is_err());
     }
 }

@@ -16,10 +16,8 @@ use tokio_rustls::rustls::pki_types::{CertificateDer, InvalidDnsNameError, Priva
 use tokio_rustls::rustls::{self, ClientConfig, RootCertStore, ServerConfig};
 use tokio_rustls::{TlsAcceptor, TlsConnector};
 
-use crate::data::failure;
-
 fn tls_failure(reason: impl ToString) -> HostFailure {
-    failure("TLS-ERROR", reason)
+    HostFailure::new("TLS-ERROR", reason)
 }
 
 /// Reason why a connection could not be secured.

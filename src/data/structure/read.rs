@@ -57,10 +57,7 @@ fn entry(pair: &Data) -> Option<(Data, Data)> {
 }
 
 /// Has the elements of a vector of numbers visited.
-fn visit_packed<'de, V: Visitor<'de>>(
-    vector: &PackedVector,
-    visitor: V,
-) -> Result<V::Value, StructureError> {
+fn visit_packed<'de, V: Visitor<'de>>(vector: &PackedVector, visitor: V) -> Result<V::Value, StructureError> {
     match vector {
         PackedVector::Bytes(bytes) => visitor.visit_seq(SeqDeserializer::new(bytes.iter().copied())),
         PackedVector::Integers(integers) => visitor.visit_seq(SeqDeserializer::new(integers.iter().copied())),

@@ -2,7 +2,7 @@
 
 use crate::builtins::rights::demand;
 use crate::builtins::task::expect_task;
-use crate::datum;
+use crate::datum::{self, DatumError};
 use crate::outside::GivenIndex;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::run;
@@ -29,6 +29,10 @@ pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(Option<GivenInde
             Ok((datum, work)) => {
                 vm.exchange.charge(work);
                 data.push(datum);
+            }
+            Err(DatumError::NoRoom(bytes)) => {
+                vm.heap.check_room(bytes)?;
+                return Err(Exit::Collect);
             }
             Err(error) => return vm.exchange.raise(Raised::Simple(error.to_string())),
         }

@@ -12,6 +12,7 @@
 //! Guarantees: walks use no native stack in proportion to depth. Circular and oversized structure is refused
 //! with a text.
 
+mod border;
 mod environment;
 mod packed;
 mod walk;
@@ -28,6 +29,8 @@ use crate::names::load::{SharedObjects, array, character, integer, ratio};
 use crate::names::{GivenMap, GivenSet, Names, RootMap};
 use crate::value::Value;
 
+use border::work_of;
+pub(crate) use border::{export, import};
 use environment::Environments;
 pub(crate) use walk::DatumWalk;
 use walk::{ObjectParts, parts_of, plain_kind};
@@ -37,9 +40,6 @@ const MAX_NODES: usize = 4_000_000;
 
 /// Bytes of a node of a datum, and of what a unit and a walk remember about it.
 const NODE_BYTES: usize = 250;
-
-/// Bytes of a text that are moved in the time that a node takes.
-const BYTES_TOGETHER: usize = 16;
 
 /// Greatest number of objects whose data a unit remembers.
 const MAX_REMEMBERED: usize = 1 << 19;
@@ -461,56 +461,6 @@ fn is_equivalent(a: &Datum, b: &Datum) -> bool {
             (DatumKind::Opaque(a), DatumKind::Opaque(b)) => a == b,
             _ => false,
         }
-}
-
-/// Returns a value as data, and the work that it took.
-///
-/// # Errors
-/// [`DatumError`].
-pub(crate) fn export(heap: &Heap, names: &Names, value: Value) -> Result<(Datum, usize), DatumError> {
-    // An atom shares nothing with other parts, so it needs neither walk nor memory.
-    let plain = || Some(Datum::new(plain_kind(heap, value)?, Span::default()));
-    if let Some(datum) = names.opaque_of(heap, value).cloned().or_else(plain) {
-        let work = work_of(&datum);
-        return Ok((datum, work));
-    }
-    if let Some(vector) = packed::vector_of(heap, value)? {
-        let work = vector.work();
-        return Ok((Datum::new(DatumKind::Packed(vector), Span::default()), work));
-    }
-    let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
-    if names.is_symbol(heap, value) {
-        return Ok((unit.atom_datum(heap, names, value, Span::default()), 1));
-    }
-    Ok((unit.datum_of(heap, names, value, Span::default())?, unit.take_work() as usize))
-}
-
-/// Returns the work of moving a datum that is not compound.
-fn work_of(datum: &Datum) -> usize {
-    match datum.kind() {
-        DatumKind::String(text) => 1 + text.len() / BYTES_TOGETHER,
-        DatumKind::Packed(vector) => vector.work(),
-        _ => 1,
-    }
-}
-
-/// Returns data as a value, and the work that it took.
-///
-/// # Errors
-/// As for every allocation.
-pub(crate) fn import(
-    heap: &mut Heap,
-    names: &mut Names,
-    datum: &Datum,
-) -> Result<(Value, usize), AllocError> {
-    if let DatumKind::String(text) = datum.kind() {
-        return Ok((heap.alloc_str(text)?, work_of(datum)));
-    }
-    let mut unit = Unit::default();
-    if !datum.is_compound() {
-        return Ok((unit.atom_value(heap, names, datum)?, work_of(datum)));
-    }
-    Ok((unit.value_of(heap, names, datum)?, unit.take_work() as usize))
 }
 
 #[cfg(test)]

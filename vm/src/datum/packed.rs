@@ -6,8 +6,8 @@ use esl_heap::array::{ArrayElements, vector_elements};
 
 use super::DatumError;
 use crate::heap::{AllocError, Heap};
-use crate::value::Value;
 use crate::names::load::integer;
+use crate::value::Value;
 
 /// Returns the object of a vector.
 ///

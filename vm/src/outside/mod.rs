@@ -9,33 +9,12 @@ use std::hash::{BuildHasherDefault, DefaultHasher};
 use esl_bytecode::datum::Datum;
 use esl_heap::state::{StateSink, Stated};
 use esl_host::machine::{Asked, Canceller, Console};
-use esl_host::{Host, HostFailure, HostOperation, Inbox, Output, Right};
+use esl_host::{Host, HostFailure, HostFunction, HostOperation, Inbox, Need, Output};
 use indexmap::IndexMap;
 
 use crate::task::TaskNumber;
 use crate::value::Value;
 pub(crate) use under_way::Operations;
-
-/// Code of the embedder's that takes and returns data, and cannot call back.
-pub type DataFunction = Box<dyn FnMut(&[Datum]) -> Result<Datum, HostFailure> + Send>;
-
-/// A function that the embedder gives to programs.
-pub enum HostFunction {
-    /// It returns at once.
-    AtOnce(DataFunction),
-    /// It begins an operation.
-    Operation(Box<dyn FnMut(HostOperation) + Send>),
-}
-
-/// A right that a function of the embedder's needs: to the text that is this argument of a call. The function
-/// is given what was permitted in its place. An argument that is no text needs none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Need {
-    /// The right.
-    pub right: Right,
-    /// Index of the argument.
-    pub argument: usize,
-}
 
 /// A function of the embedder's, and what it needs.
 pub(crate) struct Given {

@@ -13,14 +13,12 @@ use std::io::Error;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use esl_bytecode::datum::Datum;
-use esl_bytecode::span::Span;
-use esl_host::{FileAnswer, FileRequest, HostError, HostFailure, Right, request_of_files};
-use esl_vm::embed::{HostFunction, Need};
-use esl_vm::vm::Vm;
+use esl_host::{
+    FileAnswer, FileRequest, HostError, HostFailure, HostHandle, HostObject, HostRows, Inbox, IntoDatum,
+    Payload, Right, Values, request_of_files,
+};
 
-use crate::data::{CallArguments, Numbered, boolean, failure, handle, integer, nil, text};
-use crate::operation::{Completion, define, define_with_end};
+use crate::operation::{Cancelled, spawned, to_its_end};
 
 mod open;
 
@@ -41,185 +39,253 @@ async fn in_thread<T: Send + 'static>(
     tokio::task::spawn_blocking(function).await.map_err(Error::other)?
 }
 
-/// The open files of a machine.
-#[derive(Clone, Default)]
-struct Files(Arc<Mutex<Numbered<Arc<Open>>>>);
+/// A file of the program's.
+#[derive(Default)]
+struct FileSlot(Mutex<FileStage>);
 
-impl Files {
-    /// Returns the number of a file that is about to be opened.
-    fn add(&self) -> i64 {
-        let mut files = lock(&self.0);
-        files.0 += 1;
-        let number = files.0;
-        files.1.insert(number, None);
-        number
-    }
+#[derive(Default)]
+enum FileStage {
+    /// It has yet to be opened.
+    #[default]
+    New,
+    Open(Arc<Open>),
+    Closed,
+}
 
-    fn get(&self, number: i64) -> Result<Arc<Open>, HostFailure> {
-        let open = lock(&self.0).1.get(&number).cloned().flatten();
-        open.ok_or_else(|| failure("SIMPLE-ERROR", "The file is closed."))
-    }
+impl HostObject for FileSlot {
+    const KIND: &'static str = "FILE";
+}
 
-    /// Says what a number stands for, unless it has been closed meanwhile.
-    fn set(&self, number: i64, open: Open) {
-        if let Some(place) = lock(&self.0).1.get_mut(&number) {
-            *place = Some(Arc::new(open));
+impl FileSlot {
+    fn get(&self) -> Result<Arc<Open>, HostFailure> {
+        match &*lock(&self.0) {
+            FileStage::Open(open) => Ok(open.clone()),
+            _ => Err(HostFailure::new("SIMPLE-ERROR", "The file is closed.")),
         }
     }
 
-    fn close(&self, number: i64) {
-        let open = lock(&self.0).1.remove(&number).flatten();
-        if let Some(open) = open {
+    /// Says what a file is, unless it has been closed meanwhile.
+    fn set(&self, open: Open) {
+        let mut stage = lock(&self.0);
+        if matches!(*stage, FileStage::New) {
+            *stage = FileStage::Open(Arc::new(open));
+        }
+    }
+
+    fn close(&self) {
+        let stage = std::mem::replace(&mut *lock(&self.0), FileStage::Closed);
+        if let FileStage::Open(open) = stage {
             // Nobody may wait for it.
             _ = open.closing.send(true);
         }
     }
 }
 
-/// Returns the values of an operation on a file: one, or `NIL` and what is wrong.
-fn answer(result: Result<Datum, Error>) -> Completion {
+impl Drop for FileSlot {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// Values of an operation on a file: one, or `NIL` and what is wrong.
+type FileValues = Result<Values, HostFailure>;
+
+fn answer<T: IntoDatum>(result: Result<T, Error>) -> FileValues {
     Ok(match result {
-        Ok(value) => vec![value],
-        Err(error) => vec![nil(), text(&HostError::from(&error).to_string())],
+        Ok(value) => Values(vec![value.into_datum()]),
+        Err(error) => wrong(&HostError::from(&error)),
     })
 }
 
-/// Gives a machine the operations of file streams.
-pub(crate) fn install(machine: &mut Vm) {
-    let files = Files::default();
-    define_immediate(machine, &files);
-    define_requests(machine);
-    let known = files.clone();
-    let read = [Need { right: Right::Read, argument: 1 }];
-    define(machine, "%FILE-OPEN-INPUT", &read, move |arguments| open_input(arguments, known.clone()));
-    let known = files.clone();
-    let read_module = [Need { right: Right::Module, argument: 1 }];
-    define(machine, "%MODULE-OPEN-INPUT", &read_module, move |arguments| {
-        open_input(arguments, known.clone())
-    });
-    let known = files.clone();
-    let write = [Need { right: Right::Write, argument: 1 }];
-    define(machine, "%FILE-OPEN-OUTPUT", &write, move |arguments| open_output(arguments, known.clone()));
-    let known = files.clone();
-    define(machine, "%FILE-AWAIT", &[], move |arguments| {
-        let open = arguments.number(0).and_then(|number| known.get(number));
-        async move {
-            let open = open?;
-            answer(open.clone().unless_closed(open.fill()).await.map(|()| nil()))
-        }
-    });
-    let known = files.clone();
-    define_with_end(machine, "%FILE-WRITE", &[], move |arguments, mut cancelled| {
-        let known = known.clone();
-        async move {
-            let (open, bytes) = (known.get(arguments.number(0)?)?, arguments.bytes_or_text(1, 2)?);
+fn wrong(error: &HostError) -> Values {
+    Values(vec![().into_datum(), error.to_string().into_datum()])
+}
+
+/// Returns the functions of file streams, which the library calls by their names.
+pub(crate) fn rows(inbox: &Inbox) -> HostRows {
+    let mut rows = HostRows::new(inbox);
+    add_immediate(&mut rows);
+    add_requests(&mut rows);
+    rows.operation(
+        spawned,
+        "%FILE-OPEN-INPUT",
+        ["file", "path", "as-text"],
+        "Has FILE be the file PATH, to be read. Returns whether it is a regular file.",
+        open_input,
+    )
+    .needs(Right::Read, "path");
+    rows.operation(
+        spawned,
+        "%MODULE-OPEN-INPUT",
+        ["file", "path", "as-text"],
+        "As %FILE-OPEN-INPUT, of a module.",
+        open_input,
+    )
+    .needs(Right::Module, "path");
+    rows.operation(
+        spawned,
+        "%FILE-OPEN-OUTPUT",
+        ["file", "path", "mode"],
+        "Has FILE be the file PATH, to be written: MODE 0 replaces it, 1 appends to it, 2 fails if there is one, 3 \
+         writes over it from its beginning.",
+        open_output,
+    )
+    .needs(Right::Write, "path");
+    rows.operation(
+        spawned,
+        "%FILE-AWAIT",
+        ["file"],
+        "Waits until something can be taken.",
+        |file: HostHandle<FileSlot>| async move {
+            let open = file.get()?;
+            answer(open.clone().unless_closed(open.fill()).await)
+        },
+    );
+    rows.operation(
+        to_its_end,
+        "%FILE-WRITE",
+        ["file", "contents"],
+        "Writes CONTENTS, a text or bytes.",
+        |mut cancelled: Cancelled, file: HostHandle<FileSlot>, Payload(bytes): Payload| async move {
+            let open = file.get()?;
             // A disk is waited for: what is left half-written would come later, among other things.
             let is_disk = matches!(open.access, FileAccess::Parts(..));
             let target = open.clone();
             let write = open.unless_closed(target.write(bytes));
             tokio::select! {
                 biased;
-                () = cancelled.wait(), if !is_disk => Err(failure("CANCELLED", "")),
-                result = write => answer(result.map(|()| nil())),
+                () = cancelled.wait(), if !is_disk => Err(HostFailure::new("CANCELLED", "")),
+                result = write => answer(result),
             }
-        }
-    });
-    let known = files.clone();
-    define(machine, "%FILE-SEEK", &[], move |arguments| {
-        let known = known.clone();
-        async move {
-            let open = known.get(arguments.number(0)?)?;
-            let position = u64::try_from(arguments.integer(1)?).unwrap_or(0);
+        },
+    );
+    rows.operation(
+        spawned,
+        "%FILE-SEEK",
+        ["file", "position"],
+        "Goes on at POSITION. Returns whether FILE is one that can.",
+        |file: HostHandle<FileSlot>, position: u64| async move {
+            let open = file.get()?;
             let _turn = open.turn.lock().await;
             let seeking = open.clone();
-            answer(in_thread(move || seeking.seek(position)).await.map(boolean))
-        }
-    });
-    let read = [Need { right: Right::Read, argument: 0 }];
-    define(machine, "%FILE-SIZE", &read, |arguments| async move {
-        let path = arguments.text(0)?;
-        let size = in_thread(move || std::fs::metadata(path)).await.map(|metadata| metadata.len());
-        answer(size.map(|size| integer(i64::try_from(size).unwrap_or(i64::MAX))))
-    });
+            answer(in_thread(move || seeking.seek(position)).await)
+        },
+    );
+    rows.operation(
+        spawned,
+        "%FILE-SIZE",
+        ["path"],
+        "Returns the number of bytes of the file PATH.",
+        |path: String| async move {
+            let size = in_thread(move || std::fs::metadata(path)).await.map(|metadata| metadata.len());
+            answer(size.map(|size| i64::try_from(size).unwrap_or(i64::MAX)))
+        },
+    )
+    .needs(Right::Read, "path");
+    rows
 }
 
-/// Gives a machine the operations on files as wholes.
-fn define_requests(machine: &mut Vm) {
-    let read = [Need { right: Right::Read, argument: 0 }];
-    let write = [Need { right: Right::Write, argument: 0 }];
-    let both = [write[0], Need { right: Right::Write, argument: 1 }];
-    let read_module = [Need { right: Right::Module, argument: 0 }];
-    let probes = [("%FILE-PROBE", read), ("%FILE-PROBE-OUTPUT", write), ("%MODULE-PROBE", read_module)];
-    for (name, need) in probes {
-        define(machine, name, &need, |arguments| async move {
-            let path = arguments.text(0)?;
-            answer(in_thread(move || Ok(Path::new(&path).is_file())).await.map(boolean))
-        });
-    }
-    define(machine, "%FILE-DELETE", &write, |arguments| async move {
-        let path = arguments.text(0)?;
-        answer(in_thread(move || std::fs::remove_file(path)).await.map(|()| boolean(true)))
-    });
-    define(machine, "%FILE-LIST", &read, |arguments| async move {
-        let path = arguments.text(0)?;
-        requested(move || request_of_files(FileRequest::List(&path))).await
-    });
-    define(machine, "%FILE-TRUE-NAME", &read, |arguments| async move {
-        let path = arguments.text(0)?;
-        let request = move || Ok(request_of_files(FileRequest::TrueName(&path)));
-        let result = in_thread(request).await.unwrap_or_else(|error| Err(HostError::from(&error)));
-        Ok(match result {
-            Ok(FileAnswer::Names(names)) => vec![names.first().map_or_else(nil, |name| text(name))],
-            Ok(_) | Err(HostError::NotFound) => vec![nil()],
-            Err(error) => vec![nil(), text(&error.to_string())],
-        })
-    });
-    define(machine, "%FILE-DATE", &read, |arguments| async move {
-        let path = arguments.text(0)?;
-        requested(move || request_of_files(FileRequest::Date(&path))).await
-    });
-    define(machine, "%FILE-MAKE-FOLDERS", &write, |arguments| async move {
-        let path = arguments.text(0)?;
-        requested(move || request_of_files(FileRequest::MakeFolders(&path))).await
-    });
-    define(machine, "%FILE-RENAME", &both, |arguments| async move {
-        let (from, to) = (arguments.text(0)?, arguments.text(1)?);
-        requested(move || request_of_files(FileRequest::Rename(&from, &to))).await
-    });
+/// Adds the operations on files as wholes.
+fn add_requests(rows: &mut HostRows) {
+    let probe = |path: String| async move { answer(in_thread(move || Ok(Path::new(&path).is_file())).await) };
+    let is_file = "Returns whether there is a file PATH.";
+    rows.operation(spawned, "%FILE-PROBE", ["path"], is_file, probe).needs(Right::Read, "path");
+    rows.operation(spawned, "%FILE-PROBE-OUTPUT", ["path"], is_file, probe).needs(Right::Write, "path");
+    rows.operation(spawned, "%MODULE-PROBE", ["path"], is_file, probe).needs(Right::Module, "path");
+    rows.operation(spawned, "%FILE-DELETE", ["path"], "Deletes the file PATH.", |path: String| async move {
+        answer(in_thread(move || std::fs::remove_file(path)).await.map(|()| true))
+    })
+    .needs(Right::Write, "path");
+    rows.operation(
+        spawned,
+        "%FILE-LIST",
+        ["path"],
+        "Returns the names of what is in the folder PATH.",
+        |path: String| async move { requested(move || request_of_files(FileRequest::List(&path))).await },
+    )
+    .needs(Right::Read, "path");
+    rows.operation(
+        spawned,
+        "%FILE-TRUE-NAME",
+        ["path"],
+        "Returns the name of PATH after all links; NIL if nothing is there.",
+        |path: String| async move {
+            let request = move || Ok(request_of_files(FileRequest::TrueName(&path)));
+            let result = in_thread(request).await.unwrap_or_else(|error| Err(HostError::from(&error)));
+            Ok(match result {
+                Ok(FileAnswer::Names(names)) => Values(vec![names.into_iter().next().into_datum()]),
+                Ok(_) | Err(HostError::NotFound) => Values(vec![().into_datum()]),
+                Err(error) => wrong(&error),
+            })
+        },
+    )
+    .needs(Right::Read, "path");
+    rows.operation(
+        spawned,
+        "%FILE-DATE",
+        ["path"],
+        "Returns the time at which the file PATH was changed.",
+        |path: String| async move { requested(move || request_of_files(FileRequest::Date(&path))).await },
+    )
+    .needs(Right::Read, "path");
+    rows.operation(
+        spawned,
+        "%FILE-MAKE-FOLDERS",
+        ["path"],
+        "Makes the folders that PATH needs.",
+        |path: String| async move {
+            requested(move || request_of_files(FileRequest::MakeFolders(&path))).await
+        },
+    )
+    .needs(Right::Write, "path");
+    rows.operation(
+        spawned,
+        "%FILE-RENAME",
+        ["from", "to"],
+        "Renames the file FROM.",
+        |from: String, to: String| async move {
+            requested(move || request_of_files(FileRequest::Rename(&from, &to))).await
+        },
+    )
+    .needs(Right::Write, "from")
+    .needs(Right::Write, "to");
 }
 
 /// Returns the values of an operation that a thread performs.
-async fn requested(request: impl FnOnce() -> Result<FileAnswer, HostError> + Send + 'static) -> Completion {
+async fn requested(request: impl FnOnce() -> Result<FileAnswer, HostError> + Send + 'static) -> FileValues {
     let result = in_thread(move || Ok(request())).await.unwrap_or_else(|error| Err(HostError::from(&error)));
     Ok(match result {
-        Ok(FileAnswer::Names(names)) => {
-            vec![Datum::list(names.iter().map(|name| text(name)).collect::<Vec<_>>(), Span::default())]
-        }
-        Ok(FileAnswer::Date(seconds)) => vec![integer(seconds)],
-        Ok(FileAnswer::Done(is_done)) => vec![boolean(is_done)],
-        Err(error) => vec![nil(), text(&error.to_string())],
+        Ok(FileAnswer::Names(names)) => Values(vec![names.into_datum()]),
+        Ok(FileAnswer::Date(seconds)) => Values(vec![seconds.into_datum()]),
+        Ok(FileAnswer::Done(is_done)) => Values(vec![is_done.into_datum()]),
+        Err(error) => wrong(&error),
     })
 }
 
-/// Gives a machine the functions that do not wait.
-fn define_immediate(machine: &mut Vm, files: &Files) {
-    let mut define = |name: &str, function: fn(CallArguments, &Files) -> Result<Datum, HostFailure>| {
-        let files = files.clone();
-        let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()), &files);
-        machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
-    };
-    define("%FILE-NEW", |_, files| {
-        let known = files.clone();
-        Ok(handle("FILE", files.add(), move |number| known.close(number)))
+/// Adds the functions that do not wait.
+fn add_immediate(rows: &mut HostRows) {
+    let mut made = 0;
+    rows.at_once("%FILE-NEW", [], "Returns a file that is not open.", move || {
+        made += 1;
+        Ok(HostHandle::new(made, FileSlot::default()))
     });
-    define("%FILE-TAKE", |arguments, files| Ok(files.get(arguments.number(0)?)?.take(arguments.is_true(1))));
-    define("%FILE-POSITION", |arguments, files| {
-        let position = files.get(arguments.number(0)?)?.position();
-        Ok(position.map_or_else(nil, |position| integer(i64::try_from(position).unwrap_or(i64::MAX))))
-    });
-    define("%FILE-CLOSE", |arguments, files| {
-        files.close(arguments.number(0)?);
-        Ok(nil())
+    rows.at_once(
+        "%FILE-TAKE",
+        ["file", "as-text"],
+        "Takes what has been read, a text or bytes; NIL at the end.",
+        |file: HostHandle<FileSlot>, as_text: bool| Ok(file.get()?.take(as_text)),
+    );
+    rows.at_once(
+        "%FILE-POSITION",
+        ["file"],
+        "Returns where the next byte is read or written; NIL for the end.",
+        |file: HostHandle<FileSlot>| {
+            Ok(file.get()?.position().map(|position| i64::try_from(position).unwrap_or(i64::MAX)))
+        },
+    );
+    rows.at_once("%FILE-CLOSE", ["file"], "Closes FILE.", |file: HostHandle<FileSlot>| {
+        file.close();
+        Ok(())
     });
 }
 
@@ -249,17 +315,17 @@ fn polled(file: &File, interest: tokio::io::Interest) -> Option<FileAccess> {
     registered.ok().map(FileAccess::Polled)
 }
 
-/// `%FILE-OPEN-INPUT`: number, path, whether it is read as text.
-async fn open_input(arguments: CallArguments, files: Files) -> Completion {
-    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
-    let text = if arguments.is_true(2) { Some(PathBuf::from(&path)) } else { None };
+/// Opens a file to be read.
+async fn open_input(file: HostHandle<FileSlot>, path: String, as_text: bool) -> FileValues {
+    let slot = file;
+    let text = as_text.then(|| PathBuf::from(&path));
     let open = move || {
         let file = at_once(OpenOptions::new().read(true)).open(&path)?;
         if file.metadata()?.is_dir() { Err(Error::other("it is a directory")) } else { Ok(file) }
     };
     let file = match in_thread(open).await {
         Ok(file) => file,
-        Err(error) => return answer(Err(error)),
+        Err(error) => return answer::<()>(Err(error)),
     };
     let is_regular = file.metadata().is_ok_and(|metadata| metadata.is_file());
     #[cfg(unix)]
@@ -267,25 +333,23 @@ async fn open_input(arguments: CallArguments, files: Files) -> Completion {
     #[cfg(not(unix))]
     let polled = None;
     let access = polled.unwrap_or_else(|| FileAccess::Threads(Mutex::new(Some(file))));
-    files.set(number, Open::new(access, text));
+    slot.set(Open::new(access, text));
     if is_regular {
         // What cannot be read fails here, and a short file is there at once.
-        return answer(files.get(number)?.fill().await.map(|()| boolean(true)));
+        return answer(slot.get()?.fill().await.map(|()| true));
     }
-    answer(Ok(boolean(false)))
+    answer(Ok(false))
 }
 
-/// `%FILE-OPEN-OUTPUT`: number, path, mode: 0 replaces the file, 1 appends to it, 2 fails if there is one, 3
-/// writes over it from its beginning.
-async fn open_output(arguments: CallArguments, files: Files) -> Completion {
-    let (number, path, mode) =
-        (arguments.number(0)?, PathBuf::from(arguments.text(1)?), arguments.integer(2)?);
+/// Opens a file to be written.
+async fn open_output(file: HostHandle<FileSlot>, path: String, mode: i64) -> FileValues {
+    let path = PathBuf::from(path);
     #[cfg(unix)]
     {
         let looked_at = path.clone();
         let is_device = in_thread(move || Ok(is_device(&looked_at))).await.unwrap_or(false);
         if is_device && mode != 2 {
-            return answer(open_device(number, path, &files).await.map(|()| nil()));
+            return answer(open_device(&file, path).await);
         }
     }
     let made = path.clone();
@@ -300,11 +364,11 @@ async fn open_output(arguments: CallArguments, files: Files) -> Completion {
         options.open(made).map(drop)
     };
     if let Err(error) = in_thread(make).await {
-        return answer(Err(error));
+        return answer::<()>(Err(error));
     }
     let next = if mode == 3 { WrittenAt::Position(0) } else { WrittenAt::End };
-    files.set(number, Open::new(FileAccess::Parts(path, Mutex::new(next)), None));
-    answer(Ok(nil()))
+    file.set(Open::new(FileAccess::Parts(path, Mutex::new(next)), None));
+    answer(Ok(()))
 }
 
 #[cfg(unix)]
@@ -318,7 +382,7 @@ fn is_device(path: &Path) -> bool {
 
 /// Opens a FIFO, when somebody reads it, or a device, for output.
 #[cfg(unix)]
-async fn open_device(number: i64, path: PathBuf, files: &Files) -> Result<(), Error> {
+async fn open_device(slot: &FileSlot, path: PathBuf) -> Result<(), Error> {
     let mut pause = std::time::Duration::from_millis(1);
     loop {
         let opened = path.clone();
@@ -326,7 +390,7 @@ async fn open_device(number: i64, path: PathBuf, files: &Files) -> Result<(), Er
             Ok(file) => {
                 let polled = polled(&file, tokio::io::Interest::WRITABLE);
                 let access = polled.unwrap_or_else(|| FileAccess::Threads(Mutex::new(Some(file))));
-                files.set(number, Open::new(access, None));
+                slot.set(Open::new(access, None));
                 return Ok(());
             }
             // The system tells nobody when a reader comes, so it is asked again.

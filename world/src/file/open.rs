@@ -5,6 +5,7 @@ use std::io::{Error, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
+use esl_bytecode::Bytes;
 use esl_bytecode::datum::Datum;
 use tokio::sync::watch;
 
@@ -131,7 +132,7 @@ impl Open {
     }
 
     /// Writes all of the bytes.
-    pub(super) async fn write(self: Arc<Open>, bytes: Vec<u8>) -> Result<(), Error> {
+    pub(super) async fn write(self: Arc<Open>, bytes: Bytes) -> Result<(), Error> {
         let _turn = self.turn.lock().await;
         #[cfg(unix)]
         if let FileAccess::Polled(file) = &self.access {

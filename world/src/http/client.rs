@@ -4,7 +4,6 @@
 //! head of the answer is waited for, and then its body is read, piece by piece, no faster than the program
 //! takes it.
 
-use std::collections::HashMap;
 use std::future::Future;
 use std::io::{Error, ErrorKind};
 use std::pin::Pin;
@@ -13,10 +12,8 @@ use std::sync::{Arc, Mutex};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use bytes::Bytes;
-use esl_bytecode::datum::Datum;
-use esl_host::{HostFailure, Right};
-use esl_vm::embed::{HostFunction, Need};
-use esl_vm::vm::Vm;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_host::{FromArgument, HostFailure, HostHandle, HostObject, HostRows, Payload, Right};
 use http_body_util::channel::{Channel, Sender};
 use http_body_util::{BodyExt, Either, Full};
 use hyper::body::{Frame, Incoming};
@@ -29,10 +26,9 @@ use tokio::task::JoinHandle;
 use url::Url;
 
 use super::coding::{ACCEPTED, Coding, PIECE};
-use super::{HEAD, HEADERS, headers_as_data, headers_of, http_failure, target};
+use super::{HEAD, HEADERS, headers_as_pairs, headers_of, http_failure, target};
 use crate::arrived::Arrived;
-use crate::data::{CallArguments, Numbered, boolean, failure, integer, nil};
-use crate::operation::{Completion, OperationFuture, define, define_ready};
+use crate::operation::{ready_soon, spawned};
 use crate::socket::{lock, socket_failure};
 
 /// Most bytes that are handed to the program at a time.
@@ -81,93 +77,148 @@ struct AnswerBody {
     _sender: SendRequest<RequestBody>,
 }
 
-/// The requests of a machine, by number.
-#[derive(Clone, Default)]
-struct HttpExchanges(Arc<Mutex<Numbered<Arc<HttpExchange>>>>);
+/// A request of the program's.
+#[derive(Default)]
+struct RequestSlot(Mutex<RequestStage>);
 
-impl HttpExchanges {
-    fn get(&self, number: i64) -> Result<Arc<HttpExchange>, HostFailure> {
-        let exchange = lock(&self.0).1.get(&number).cloned().flatten();
-        exchange.ok_or_else(|| http_failure("the request is over"))
+#[derive(Default)]
+enum RequestStage {
+    /// It has yet to be begun.
+    #[default]
+    New,
+    Begun(Arc<HttpExchange>),
+    Over,
+}
+
+impl HostObject for RequestSlot {
+    const KIND: &'static str = "HTTP-REQUEST";
+}
+
+impl RequestSlot {
+    fn get(&self) -> Result<Arc<HttpExchange>, HostFailure> {
+        match &*lock(&self.0) {
+            RequestStage::Begun(exchange) => Ok(exchange.clone()),
+            _ => Err(http_failure("the request is over")),
+        }
     }
 
     /// Says what a request is, which may have been left meanwhile.
-    fn set(&self, number: i64, exchange: HttpExchange) -> Completion {
-        let mut exchanges = lock(&self.0);
-        let known = exchanges.1.get_mut(&number).ok_or_else(|| http_failure("the request is over"))?;
-        *known = Some(Arc::new(exchange));
-        Ok(Vec::new())
+    fn set(&self, exchange: HttpExchange) -> Result<(), HostFailure> {
+        let mut stage = lock(&self.0);
+        if matches!(*stage, RequestStage::Over) {
+            return Err(http_failure("the request is over"));
+        }
+        *stage = RequestStage::Begun(Arc::new(exchange));
+        Ok(())
     }
 }
 
-/// Gives a machine the operations of clients.
-pub(super) fn install(machine: &mut Vm) {
-    let exchanges = HttpExchanges(Arc::new(Mutex::new((0, HashMap::new()))));
-    let known = exchanges.clone();
-    let add = move |_: &[Datum]| {
-        let mut exchanges = lock(&known.0);
-        exchanges.0 += 1;
-        let number = exchanges.0;
-        exchanges.1.insert(number, None);
-        Ok(integer(number))
-    };
-    machine.add_host_function("%HTTP-NEW-REQUEST", HostFunction::AtOnce(Box::new(add)));
-    let known = exchanges.clone();
-    let close = move |arguments: &[Datum]| {
-        let number = CallArguments(arguments.to_vec()).integer(0)?;
-        let exchange = lock(&known.0).1.remove(&number);
-        drop(exchange);
-        Ok(nil())
-    };
-    machine.add_host_function("%HTTP-CLOSE-REQUEST", HostFunction::AtOnce(Box::new(close)));
-    let known = exchanges.clone();
-    let needs = [Need { right: Right::Net, argument: 1 }, Need { right: Right::Read, argument: 7 }];
-    define(machine, "%HTTP-SEND", &needs, move |arguments| send(arguments, known.clone()));
-    let mut operation = |name: &str, function: ExchangeFunction| {
-        let known = exchanges.clone();
-        define_ready(machine, name, &[], move |arguments| {
-            let exchange = arguments.integer(0).and_then(|number| known.get(number));
-            Box::pin(async move { function(arguments, exchange?).await })
-        });
-    };
-    operation("%HTTP-SEND-PART", |arguments, exchange| Box::pin(send_part(arguments, exchange)));
-    operation("%HTTP-AWAIT-ANSWER", |_, exchange| Box::pin(answer(exchange)));
-    operation("%HTTP-READ", |arguments, exchange| Box::pin(read(arguments, exchange)));
+/// Body of a request, as the program gives it: a text or bytes, `NIL` for none, or `T` if it comes in parts.
+enum GivenBody {
+    Whole(Bytes),
+    InParts,
 }
 
-type ExchangeFunction = fn(CallArguments, Arc<HttpExchange>) -> OperationFuture;
+impl FromArgument for GivenBody {
+    const TYPE: &'static str = "VECTOR";
 
-/// `%HTTP-SEND`: number, address, method, URL, headers, body, whether it has bytes, file of certificates. The
-/// body is a string, `NIL`, or `T` if it comes in parts.
-async fn send(arguments: CallArguments, exchanges: HttpExchanges) -> Completion {
-    let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
-    let url = target::parse(&arguments.text(3)?, None)?;
-    let (body, parts) = body_of(&arguments)?;
-    let given = headers_of(arguments.pairs(4)?)?;
-    let takes_any_coding = given.contains_key(header::ACCEPT_ENCODING);
-    let request = request(&arguments.text(2)?, &url, given, body)?;
-    let stream = connect(&address).await?;
+    fn from_argument(datum: &Datum) -> Result<GivenBody, HostFailure> {
+        match datum.kind() {
+            DatumKind::Nil => Ok(GivenBody::Whole(Bytes::new())),
+            DatumKind::Symbol(symbol) if symbol.is_cl("T") => Ok(GivenBody::InParts),
+            _ => Payload::from_argument(datum).map(|Payload(bytes)| GivenBody::Whole(bytes)),
+        }
+    }
+}
+
+/// Adds the functions of clients.
+pub(super) fn add(rows: &mut HostRows) {
+    let mut made = 0;
+    rows.at_once("%HTTP-NEW-REQUEST", [], "Returns a request that is not begun.", move || {
+        made += 1;
+        Ok(HostHandle::new(made, RequestSlot::default()))
+    });
+    rows.at_once("%HTTP-CLOSE-REQUEST", ["request"], "Ends REQUEST.", |request: HostHandle<RequestSlot>| {
+        let stage = std::mem::replace(&mut *lock(&request.0), RequestStage::Over);
+        drop(stage);
+        Ok(())
+    });
+    rows.operation(
+        spawned,
+        "%HTTP-SEND",
+        ["request", "address", "method", "url", "headers", "body", "ca-file"],
+        "Connects to ADDRESS and begins REQUEST. BODY is a text or bytes, NIL, or T if it comes in parts.",
+        |slot: HostHandle<RequestSlot>,
+         address: String,
+         method: String,
+         url: String,
+         headers: Vec<(String, String)>,
+         body: GivenBody,
+         ca_file: Option<String>| async move {
+            let url = target::parse(&url, None)?;
+            let (body, parts) = body_of(body);
+            let given = headers_of(headers)?;
+            let takes_any_coding = given.contains_key(header::ACCEPT_ENCODING);
+            let request = request(&method, &url, given, body)?;
+            let (answer, driver) = send(&address, &url, ca_file, request).await?;
+            let (parts, answer) = (tokio::sync::Mutex::new(parts), tokio::sync::Mutex::new(answer));
+            slot.set(HttpExchange { _driver: driver, parts, answer, takes_any_coding })
+        },
+    )
+    .needs(Right::Net, "address")
+    .needs(Right::Read, "ca-file");
+    rows.operation(
+        ready_soon,
+        "%HTTP-SEND-PART",
+        ["request", "part"],
+        "Sends a part of the body, a text or bytes; NIL for the end. Returns NIL if the server takes no more.",
+        |request: HostHandle<RequestSlot>, part: Option<Payload>| async move {
+            send_part(request.get()?, part).await
+        },
+    );
+    rows.operation(
+        ready_soon,
+        "%HTTP-AWAIT-ANSWER",
+        ["request"],
+        "Waits for the head of the answer. Returns its status and its headers.",
+        |request: HostHandle<RequestSlot>| async move { answer(request.get()?).await },
+    );
+    rows.operation(
+        ready_soon,
+        "%HTTP-READ",
+        ["request", "as-bytes"],
+        "Waits for a piece of the body of the answer, a text or bytes; NIL at its end.",
+        |request: HostHandle<RequestSlot>, as_bytes: bool| async move { read(request.get()?, as_bytes).await },
+    );
+}
+
+/// Sends a request over a connection of its own.
+async fn send(
+    address: &str,
+    url: &Url,
+    ca_file: Option<String>,
+    request: Request<RequestBody>,
+) -> Result<(AnswerProgress, ConnectionDriver), HostFailure> {
+    let stream = connect(address).await?;
     // Requests are small, and are not to wait for more; without it they only take longer.
     drop(stream.set_nodelay(true));
     let (mut sender, driver) = match url.scheme() {
-        "https" => begin_secured(stream, &url, arguments.text_if_any(7)?).await?,
+        "https" => begin_secured(stream, url, ca_file).await?,
         _ => begin(stream).await?,
     };
     let waiting = sender.send_request(request);
-    let answer = tokio::sync::Mutex::new(AnswerProgress::Awaited(Box::pin(waiting), sender));
-    let exchange =
-        HttpExchange { _driver: driver, parts: tokio::sync::Mutex::new(parts), answer, takes_any_coding };
-    exchanges.set(number, exchange)
+    Ok((AnswerProgress::Awaited(Box::pin(waiting), sender), driver))
 }
 
 /// Returns the body of a request, and the channel for its parts if it is a stream.
-fn body_of(arguments: &CallArguments) -> Result<(RequestBody, Option<Sender<Bytes>>), HostFailure> {
-    if arguments.is_true(5) && arguments.text(5).is_err() {
-        let (sender, channel) = Channel::new(1);
-        return Ok((Either::Right(channel), Some(sender)));
+fn body_of(given: GivenBody) -> (RequestBody, Option<Sender<Bytes>>) {
+    match given {
+        GivenBody::Whole(bytes) => (Either::Left(Full::new(bytes)), None),
+        GivenBody::InParts => {
+            let (sender, channel) = Channel::new(1);
+            (Either::Right(channel), Some(sender))
+        }
     }
-    let bytes = if arguments.is_true(5) { arguments.bytes_or_text(5, 6)? } else { Vec::new() };
-    Ok((Either::Left(Full::new(bytes.into())), None))
 }
 
 /// Returns a request. What it says about its connection and its body is said here, unless the program says
@@ -233,8 +284,8 @@ fn check_length(headers: &HeaderMap, body: &RequestBody) -> Result<(), HostFailu
 /// Connects to an address, by the first of its meanings that answers.
 async fn connect(address: &str) -> Result<TcpStream, HostFailure> {
     let addresses =
-        tokio::net::lookup_host(address).await.map_err(|error| failure("HOST-NOT-FOUND", error))?;
-    let mut last = failure("HOST-NOT-FOUND", format!("`{address}` has no address"));
+        tokio::net::lookup_host(address).await.map_err(|error| HostFailure::new("HOST-NOT-FOUND", error))?;
+    let mut last = HostFailure::new("HOST-NOT-FOUND", format!("`{address}` has no address"));
     for address in addresses {
         match TcpStream::connect(address).await {
             Ok(stream) => return Ok(stream),
@@ -271,27 +322,21 @@ async fn begin_secured(
     _url: &Url,
     _ca_file: Option<String>,
 ) -> Result<(SendRequest<RequestBody>, ConnectionDriver), HostFailure> {
-    Err(failure("TLS-ERROR", "this program was built without TLS"))
+    Err(HostFailure::new("TLS-ERROR", "this program was built without TLS"))
 }
 
-/// `%HTTP-SEND-PART`: number, part, whether it has bytes; `NIL` for the end. Returns `NIL` if the server
-/// takes no more.
-async fn send_part(arguments: CallArguments, exchange: Arc<HttpExchange>) -> Completion {
+/// Sends a part of a body, or its end. Returns false if the server takes no more.
+async fn send_part(exchange: Arc<HttpExchange>, part: Option<Payload>) -> Result<bool, HostFailure> {
     let mut parts = exchange.parts.lock().await;
-    let is_taken = if arguments.is_true(1) {
-        let bytes = arguments.bytes_or_text(1, 2)?;
-        match parts.as_mut() {
-            Some(sender) => sender.send(Frame::data(bytes.into())).await.is_ok(),
-            None => false,
-        }
-    } else {
-        parts.take().is_some()
-    };
-    Ok(vec![boolean(is_taken)])
+    Ok(match (part, parts.as_mut()) {
+        (Some(Payload(bytes)), Some(sender)) => sender.send(Frame::data(bytes)).await.is_ok(),
+        (Some(_), None) => false,
+        (None, _) => parts.take().is_some(),
+    })
 }
 
-/// `%HTTP-AWAIT-ANSWER`: number. Returns the status and the headers.
-async fn answer(exchange: Arc<HttpExchange>) -> Completion {
+/// Waits for the head of an answer. Returns the status and the headers.
+async fn answer(exchange: Arc<HttpExchange>) -> Result<(u16, Vec<(String, String)>), HostFailure> {
     let mut answer = exchange.answer.lock().await;
     let AnswerProgress::Awaited(waiting, _) = &mut *answer else {
         return Err(http_failure("the answer was taken"));
@@ -323,29 +368,35 @@ async fn answer(exchange: Arc<HttpExchange>) -> Completion {
         head.headers.remove(header::CONTENT_ENCODING);
         head.headers.remove(header::CONTENT_LENGTH);
     }
-    let values = vec![integer(head.status.as_u16()), headers_as_data(&head.headers)];
+    let values = (head.status.as_u16(), headers_as_pairs(&head.headers));
     let (coded, arrived) = (Bytes::new(), Arrived::default());
     *answer =
         AnswerProgress::Body(Box::new(AnswerBody { incoming, coding, coded, arrived, _sender: sender }));
     Ok(values)
 }
 
-/// `%HTTP-READ`: number, whether bytes are wanted. Returns the next piece of the body; `NIL` at its end.
-async fn read(arguments: CallArguments, exchange: Arc<HttpExchange>) -> Completion {
+/// Waits for the next piece of a body; `NIL` at its end.
+async fn read(exchange: Arc<HttpExchange>, as_bytes: bool) -> Result<Datum, HostFailure> {
     let mut answer = exchange.answer.lock().await;
     let AnswerProgress::Body(body) = &mut *answer else {
         return Err(http_failure("the answer has yet to come"));
     };
     loop {
-        let piece = if arguments.is_true(1) {
-            body.arrived.take_bytes(MOST_AT_ONCE)
-        } else {
-            body.arrived.take_text(false)
-        };
-        if crate::data::text_of(&piece) != Some("") {
-            return Ok(vec![piece]);
+        let piece =
+            if as_bytes { body.arrived.take_bytes(MOST_AT_ONCE) } else { body.arrived.take_text(false) };
+        if !is_nothing(&piece) {
+            return Ok(piece);
         }
         body.receive().await?;
+    }
+}
+
+/// Returns whether a piece has no characters or bytes.
+fn is_nothing(piece: &Datum) -> bool {
+    match piece.kind() {
+        DatumKind::String(text) => text.is_empty(),
+        DatumKind::Packed(bytes) => bytes.is_empty(),
+        _ => false,
     }
 }
 

@@ -13,53 +13,35 @@ mod peer;
 mod server;
 mod target;
 
-use esl_bytecode::datum::Datum;
-use esl_bytecode::span::Span;
-use esl_host::HostFailure;
-use esl_vm::vm::Vm;
+use esl_host::{HostFailure, HostRows, Inbox};
 use hyper::HeaderMap;
 use hyper::header::{HeaderName, HeaderValue};
-
-use crate::data::{failure, text};
 
 /// Most bytes of the head of a request or an answer.
 const HEAD: usize = 64 << 10;
 /// Most headers of a request or an answer.
 const HEADERS: usize = 256;
 
-/// Gives a machine the operations of `:http`.
-pub(crate) fn install(machine: &mut Vm) {
-    client::install(machine);
-    server::install(machine);
-}
-
-/// Gives a machine the functions of `:http` that reach nothing outside.
-pub(crate) fn install_conversions(machine: &mut Vm) {
-    target::install(machine);
+/// Returns the functions of `:http`.
+pub(crate) fn rows(inbox: &Inbox) -> HostRows {
+    let mut rows = HostRows::new(inbox);
+    client::add(&mut rows);
+    server::add(&mut rows);
+    target::add(&mut rows);
+    rows
 }
 
 fn http_failure(reason: impl ToString) -> HostFailure {
-    failure("HTTP-ERROR", reason)
+    HostFailure::new("HTTP-ERROR", reason)
 }
 
-/// Returns the data of a list.
-fn list(items: impl IntoIterator<Item = Datum, IntoIter: DoubleEndedIterator>) -> Datum {
-    Datum::list(items, Span::default())
-}
-
-/// Returns an association list of texts.
-fn pairs(items: impl IntoIterator<Item = (String, String), IntoIter: DoubleEndedIterator>) -> Datum {
-    let cons = |(name, value): (String, String)| Datum::cons(text(&name), text(&value), Span::default());
-    Datum::list(items.into_iter().map(cons).collect::<Vec<_>>(), Span::default())
-}
-
-/// Returns headers as an association list. A value that is not UTF-8 is taken for Latin 1.
-fn headers_as_data(headers: &HeaderMap) -> Datum {
+/// Returns headers as names and values. A value that is not UTF-8 is taken for Latin 1.
+fn headers_as_pairs(headers: &HeaderMap) -> Vec<(String, String)> {
     let value_of = |value: &HeaderValue| match std::str::from_utf8(value.as_bytes()) {
         Ok(value) => value.to_owned(),
         Err(_) => value.as_bytes().iter().map(|&byte| char::from(byte)).collect(),
     };
-    pairs(headers.iter().map(|(name, value)| (name.to_string(), value_of(value))).collect::<Vec<_>>())
+    headers.iter().map(|(name, value)| (name.to_string(), value_of(value))).collect()
 }
 
 /// Returns the headers that the program gives.
@@ -77,13 +59,21 @@ fn headers_of(given: Vec<(String, String)>) -> Result<HeaderMap, HostFailure> {
     Ok(headers)
 }
 
+/// Returns the text of a failure.
+#[cfg(test)]
+fn reason_of(failure: &HostFailure) -> String {
+    match failure.arguments.first().map(esl_bytecode::datum::Datum::kind) {
+        Some(esl_bytecode::datum::DatumKind::String(reason)) => reason.to_string(),
+        _ => String::new(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn refusal(name: &str, value: &str) -> Option<String> {
-        let failure = headers_of(vec![(name.into(), value.into())]).err()?;
-        failure.arguments.first().and_then(crate::data::text_of).map(str::to_owned)
+        headers_of(vec![(name.into(), value.into())]).err().as_ref().map(reason_of)
     }
 
     #[test]

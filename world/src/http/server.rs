@@ -1,10 +1,10 @@
-//! Servers: requests of others, which the program is handed one by one, and answers.
+//! Servers: requests of others, with which an input of the program is signalled, and answers.
 //!
-//! A server has a task on the event loop for each connection, which reads requests, whole, and waits for the
-//! program's answers. The program takes what happens in its order: a request, or that the client of one has
-//! gone.
+//! A server has a task on the event loop for each connection, which reads requests, whole, signals the input
+//! with each, and waits for the program's answer. When the client of one has gone, the input is signalled
+//! with its number alone.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 use std::future::Future;
 use std::io::Error;
 use std::pin::pin;
@@ -13,9 +13,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use esl_bytecode::datum::Datum;
-use esl_host::{HostFailure, Right};
-use esl_vm::embed::{HostFunction, Need};
-use esl_vm::vm::Vm;
+use esl_host::{HostFailure, HostHandle, HostInput, HostObject, HostRows, IntoDatum, Payload, Right, Sender};
 use http_body_util::{BodyExt, Full};
 use hyper::body::{Body, Incoming};
 use hyper::header::{self, HeaderValue};
@@ -27,13 +25,12 @@ use hyper::{Method, Request, Response, StatusCode, Version};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpListener;
-use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, oneshot, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot, watch};
 
 use super::peer::Peer;
-use super::{HEAD, HEADERS, headers_as_data, headers_of, http_failure, list, pairs, target};
-use crate::data::{CallArguments, Numbered, boolean, integer, nil, text, text_of_bytes};
+use super::{HEAD, HEADERS, headers_as_pairs, headers_of, http_failure, target};
 use crate::event_loop;
-use crate::operation::{Completion, define, define_ready};
+use crate::operation::spawned;
 use crate::socket::{bind, bind_failure, lock, next_connection};
 
 /// Most connections at a time; more wait in the system's queue.
@@ -44,132 +41,129 @@ const HEAD_TIME: Duration = Duration::from_secs(10);
 const BODY_TIME: Duration = Duration::from_secs(30);
 /// Most bytes of the body of a request.
 const BODY: u64 = 64 << 20;
-/// Most bytes of bodies, in units of 1024, that the program has not taken.
+/// Most bytes of bodies, in units of 1024, of requests that are not answered.
 const BODIES: usize = 256 << 10;
 /// Time in which the last answers have to be sent when a server is closed.
 const GOODBYE: Duration = Duration::from_secs(1);
-
-/// What has happened at a server, which the program takes.
-enum ServerEvent {
-    Request {
-        id: i64,
-        head: Box<Parts>,
-        body: Vec<u8>,
-        _room: Vec<OwnedSemaphorePermit>,
-    },
-    /// The client of a request that the program has taken is gone.
-    Gone(i64),
-}
 
 type HttpAnswer = Response<Full<Bytes>>;
 
 /// What the connections of a server share with the operations.
 struct ServerState {
-    events: Mutex<VecDeque<ServerEvent>>,
-    /// Notified when something has happened.
-    came: Notify,
+    input: HostInput,
     /// Where the answers go, by the numbers of their requests; the greatest number so far.
     asked: Mutex<(i64, HashMap<i64, oneshot::Sender<HttpAnswer>>)>,
     connections: Arc<Semaphore>,
     bodies: Arc<Semaphore>,
 }
 
-/// A server of the program's.
+/// A server that listens.
 struct Server {
     shared: Arc<ServerState>,
-    /// Becomes true, or is dropped with the machine, when the server is to end.
+    /// Becomes true, or is dropped when the program has lost it, when the server is to end.
     closing: watch::Sender<bool>,
 }
 
-/// The servers of a machine, by number.
-#[derive(Clone, Default)]
-struct Servers(Arc<Mutex<Numbered<Server>>>);
+/// A server of the program's; nothing before it listens, and after it is closed.
+#[derive(Default)]
+struct ServerSlot(Mutex<Option<Server>>);
 
-impl Servers {
-    fn get(&self, number: i64) -> Result<Arc<ServerState>, HostFailure> {
-        let servers = lock(&self.0);
-        let server = servers.1.get(&number).and_then(Option::as_ref);
-        server.map(|server| server.shared.clone()).ok_or_else(|| http_failure("the server is closed"))
+impl HostObject for ServerSlot {
+    const KIND: &'static str = "HTTP-SERVER";
+}
+
+impl ServerSlot {
+    fn get(&self) -> Result<Arc<ServerState>, HostFailure> {
+        let server = lock(&self.0);
+        server
+            .as_ref()
+            .map(|server| server.shared.clone())
+            .ok_or_else(|| http_failure("the server is closed"))
     }
 }
 
-/// Gives a machine the operations of servers.
-pub(super) fn install(machine: &mut Vm) {
-    let servers = Servers(Arc::new(Mutex::new((0, HashMap::new()))));
-    let mut at_once = |name: &str, function: fn(CallArguments, &Servers) -> Result<Datum, HostFailure>| {
-        let servers = servers.clone();
-        let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()), &servers);
-        machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
-    };
-    at_once("%HTTP-NEW-SERVER", |_, servers| {
-        let mut servers = lock(&servers.0);
-        servers.0 += 1;
-        let number = servers.0;
-        servers.1.insert(number, None);
-        Ok(integer(number))
+/// Adds the functions of servers.
+pub(super) fn add(rows: &mut HostRows) {
+    let mut made = 0;
+    rows.at_once("%HTTP-NEW-SERVER", [], "Returns a server that does not listen.", move || {
+        made += 1;
+        Ok(HostHandle::new(made, ServerSlot::default()))
     });
-    at_once("%HTTP-TAKE", |arguments, servers| {
-        let event = lock(&servers.get(arguments.integer(0)?)?.events).pop_front();
-        Ok(event.map_or_else(nil, |event| as_data(&event)))
-    });
-    at_once("%HTTP-ANSWER", answer);
-    at_once("%HTTP-DROP", |arguments, servers| {
-        // The server may be closed, and the request answered.
-        if let Ok(shared) = servers.get(arguments.integer(0)?) {
-            let asked = lock(&shared.asked).1.remove(&arguments.integer(1)?);
-            drop(asked);
-        }
-        Ok(nil())
-    });
-    let needs = [1, 2, 3]
-        .map(|argument| Need { right: if argument == 1 { Right::Net } else { Right::Read }, argument });
-    let known = servers.clone();
-    define(machine, "%HTTP-LISTEN", &needs, move |arguments| listen(arguments, known.clone()));
-    let known = servers.clone();
-    define_ready(machine, "%HTTP-AWAIT", &[], move |arguments| {
-        let shared = arguments.integer(0).and_then(|number| known.get(number));
-        Box::pin(async move {
-            let shared = shared?;
-            while lock(&shared.events).is_empty() {
-                shared.came.notified().await;
+    rows.operation(
+        spawned,
+        "%HTTP-LISTEN",
+        ["server", "input", "address", "certificate", "key"],
+        "Has SERVER listen at ADDRESS; by TLS, if there are files of CERTIFICATE and KEY. Returns the port. The input \
+         with the name INPUT is signalled with each request: its number, method, path, the parts of that, query, \
+         headers, and body, a text; and with the number alone when the client of one has gone.",
+        listen,
+    )
+    .needs(Right::Net, "address")
+    .needs(Right::Read, "certificate")
+    .needs(Right::Read, "key");
+    rows.at_once(
+        "%HTTP-ANSWER",
+        ["server", "request", "status", "headers", "body"],
+        "Answers the request with the number REQUEST. BODY is a text or bytes. Returns whether the client is there.",
+        answer,
+    );
+    rows.at_once(
+        "%HTTP-DROP",
+        ["server", "request"],
+        "Gives up the request with the number REQUEST, unless it is answered.",
+        |server: HostHandle<ServerSlot>, request: i64| {
+            // The server may be closed.
+            if let Ok(shared) = server.get() {
+                let asked = lock(&shared.asked).1.remove(&request);
+                drop(asked);
             }
-            Ok(Vec::new())
-        })
-    });
-    define(machine, "%HTTP-CLOSE-SERVER", &[], move |arguments| {
-        let server = arguments.integer(0).map(|number| lock(&servers.0).1.remove(&number).flatten());
-        async move {
-            if let Some(Server { shared, closing }) = server? {
-                // Unanswered requests get the status 503; answers given before are sent.
+            Ok(())
+        },
+    );
+    rows.operation(
+        spawned,
+        "%HTTP-CLOSE-SERVER",
+        ["server"],
+        "Ends SERVER. Requests that are not answered get the status 503.",
+        |server: HostHandle<ServerSlot>| async move {
+            let listening = lock(&server.0).take();
+            if let Some(Server { shared, closing }) = listening {
+                // Answers given before are sent.
                 lock(&shared.asked).1.clear();
                 _ = closing.send(true);
                 _ = tokio::time::timeout(2 * GOODBYE, closing.closed()).await;
             }
-            Ok(Vec::new())
-        }
-    });
+            Ok(())
+        },
+    );
 }
 
-/// `%HTTP-LISTEN`: number, address, files of certificate and key if it is secured. Returns the port.
-async fn listen(arguments: CallArguments, servers: Servers) -> Completion {
-    let secured = Secured::read(arguments.text_if_any(2)?, arguments.text_if_any(3)?).await?;
-    let listener = bind(&arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
-    let port = listener.local_addr().map_or(0, |address| i64::from(address.port()));
+/// Has a server listen. Returns the port.
+async fn listen(
+    sender: Sender,
+    server: HostHandle<ServerSlot>,
+    input: HostInput,
+    address: String,
+    certificate: Option<String>,
+    key: Option<String>,
+) -> Result<u16, HostFailure> {
+    let secured = Secured::read(certificate, key).await?;
+    let listener = bind(&address).await.map_err(|error| bind_failure(&error))?;
+    let port = listener.local_addr().map_or(0, |address| address.port());
     let shared = Arc::new(ServerState {
-        events: Mutex::default(),
-        came: Notify::new(),
+        input,
         asked: Mutex::default(),
         connections: Arc::new(Semaphore::new(CONNECTIONS)),
         bodies: Arc::new(Semaphore::new(BODIES)),
     });
     let (closing, closes) = watch::channel(false);
-    let mut servers = lock(&servers.0);
-    let known =
-        servers.1.get_mut(&arguments.integer(0)?).ok_or_else(|| http_failure("the server is closed"))?;
-    *known = Some(Server { shared: shared.clone(), closing });
+    *lock(&server.0) = Some(Server { shared: shared.clone(), closing });
     // This runs on the event loop, so there is one.
-    _ = event_loop::spawn(accept(listener, secured, shared, closes));
-    Ok(vec![integer(port)])
+    _ = event_loop::spawn(async move {
+        accept(listener, secured, shared, closes).await;
+        drop(sender);
+    });
+    Ok(port)
 }
 
 /// What connections are secured with, if they are.
@@ -191,7 +185,7 @@ impl Secured {
     async fn read(certificate: Option<String>, _key: Option<String>) -> Result<Secured, HostFailure> {
         match certificate {
             None => Ok(Secured()),
-            Some(_) => Err(crate::data::failure("TLS-ERROR", "this program was built without TLS")),
+            Some(_) => Err(HostFailure::new("TLS-ERROR", "this program was built without TLS")),
         }
     }
 
@@ -276,12 +270,21 @@ async fn respond(
         Ok(received) => received,
         Err((status, reason)) => return Ok(refusal(status, &reason)),
     };
-    let (asked, mut answered) = PendingRequest::new(shared, head, body, room);
+    let (mut asked, answered) = PendingRequest::new(shared.clone());
+    let arguments = as_data(asked.id, &head, &body);
+    drop(body);
+    let answer = async {
+        // While there is no room in the input, the client waits.
+        if shared.input.signal(arguments).await.is_ok() {
+            asked.is_signalled = true;
+        }
+        answered.await
+    };
     let answer = tokio::select! {
-        answer = &mut answered => answer,
+        answer = answer => answer,
         () = peer.gone() => return Err(Error::other("the client has gone")),
     };
-    drop(asked);
+    drop((asked, room));
     Ok(answer.unwrap_or_else(|_| refusal(StatusCode::SERVICE_UNAVAILABLE, "this request was given up")))
 }
 
@@ -289,15 +292,12 @@ async fn respond(
 struct PendingRequest {
     shared: Arc<ServerState>,
     id: i64,
+    /// Whether the input was signalled with it.
+    is_signalled: bool,
 }
 
 impl PendingRequest {
-    fn new(
-        shared: Arc<ServerState>,
-        head: Parts,
-        body: Vec<u8>,
-        room: Vec<OwnedSemaphorePermit>,
-    ) -> (PendingRequest, oneshot::Receiver<HttpAnswer>) {
+    fn new(shared: Arc<ServerState>) -> (PendingRequest, oneshot::Receiver<HttpAnswer>) {
         let (answer, answered) = oneshot::channel();
         let id = {
             let mut asked = lock(&shared.asked);
@@ -306,25 +306,17 @@ impl PendingRequest {
             asked.1.insert(id, answer);
             id
         };
-        lock(&shared.events).push_back(ServerEvent::Request { id, head: Box::new(head), body, _room: room });
-        shared.came.notify_one();
-        (PendingRequest { shared, id }, answered)
+        (PendingRequest { shared, id, is_signalled: false }, answered)
     }
 }
 
 impl Drop for PendingRequest {
     fn drop(&mut self) {
-        if lock(&self.shared.asked).1.remove(&self.id).is_none() {
-            return;
-        }
-        // It was not answered. The program either has yet to take it, or works on it.
-        let mut events = lock(&self.shared.events);
-        let before = events.len();
-        events.retain(|event| !matches!(event, ServerEvent::Request { id, .. } if *id == self.id));
-        if events.len() == before {
-            events.push_back(ServerEvent::Gone(self.id));
-            drop(events);
-            self.shared.came.notify_one();
+        if lock(&self.shared.asked).1.remove(&self.id).is_some() && self.is_signalled {
+            // It was not answered, and the program works on it, or will.
+            let (input, id) = (self.shared.input.clone(), self.id);
+            // The program may have closed the input.
+            _ = event_loop::spawn(async move { drop(input.signal(vec![id.into_datum()]).await) });
         }
     }
 }
@@ -421,41 +413,40 @@ fn refusal(status: StatusCode, reason: &str) -> HttpAnswer {
     response
 }
 
-/// Returns what has happened as data: a list of the number of a request alone if its client has gone;
-/// otherwise also method, path, the parts of that, query, headers, and bytes of the body.
-fn as_data(event: &ServerEvent) -> Datum {
-    match event {
-        ServerEvent::Gone(id) => list([integer(*id)]),
-        ServerEvent::Request { id, head, body, .. } => list([
-            integer(*id),
-            text(head.method.as_str()),
-            text(head.uri.path()),
-            list(target::parts(head.uri.path())),
-            pairs(target::query(head.uri.query().unwrap_or_default())),
-            headers_as_data(&head.headers),
-            text_of_bytes(body),
-        ]),
-    }
+/// Returns a request as data: its number, method, path, the parts of that, query, headers, and body.
+fn as_data(id: i64, head: &Parts, body: &[u8]) -> Vec<Datum> {
+    vec![
+        id.into_datum(),
+        head.method.as_str().into_datum(),
+        head.uri.path().into_datum(),
+        target::parts(head.uri.path()).into_datum(),
+        target::query(head.uri.query().unwrap_or_default()).into_datum(),
+        headers_as_pairs(&head.headers).into_datum(),
+        String::from_utf8_lossy(body).as_ref().into_datum(),
+    ]
 }
 
-/// `%HTTP-ANSWER`: server, request, status, headers, body, whether it has bytes. Returns whether the client
-/// is there.
-fn answer(arguments: CallArguments, servers: &Servers) -> Result<Datum, HostFailure> {
-    let status =
-        u16::try_from(arguments.integer(2)?).ok().and_then(|status| StatusCode::from_u16(status).ok());
+/// Answers a request. Returns whether the client is there.
+fn answer(
+    server: HostHandle<ServerSlot>,
+    request: i64,
+    status: i64,
+    headers: Vec<(String, String)>,
+    Payload(body): Payload,
+) -> Result<bool, HostFailure> {
+    let status = u16::try_from(status).ok().and_then(|status| StatusCode::from_u16(status).ok());
     let status = status.filter(|status| !status.is_informational());
     let status = status.ok_or_else(|| http_failure("the status of an answer is a number from 200 to 999"))?;
-    let mut headers = headers_of(arguments.pairs(3)?)?;
+    let mut headers = headers_of(headers)?;
     // hyper writes them, from the body.
     headers.remove(header::CONTENT_LENGTH);
     headers.remove(header::TRANSFER_ENCODING);
     let is_empty =
         matches!(status, StatusCode::NO_CONTENT | StatusCode::RESET_CONTENT | StatusCode::NOT_MODIFIED);
-    let body = if is_empty { Vec::new() } else { arguments.bytes_or_text(4, 5)? };
-    let mut response = Response::new(Full::new(body.into()));
+    let mut response = Response::new(Full::new(if is_empty { Bytes::new() } else { body }));
     *response.status_mut() = status;
     *response.headers_mut() = headers;
-    let shared = servers.get(arguments.integer(0)?)?;
-    let asked = lock(&shared.asked).1.remove(&arguments.integer(1)?);
-    Ok(boolean(asked.is_some_and(|asked| asked.send(response).is_ok())))
+    let shared = server.get()?;
+    let asked = lock(&shared.asked).1.remove(&request);
+    Ok(asked.is_some_and(|asked| asked.send(response).is_ok()))
 }

@@ -1,13 +1,9 @@
 //! Targets of requests: what a URL says, by the rules of browsers, and the parts of a target that has come.
 
-use esl_bytecode::datum::Datum;
-use esl_host::HostFailure;
-use esl_vm::embed::HostFunction;
-use esl_vm::vm::Vm;
+use esl_host::{HostFailure, HostRows};
 use url::{ParseError, Url};
 
-use super::{http_failure, list};
-use crate::data::{CallArguments, text};
+use super::http_failure;
 
 /// Returns the URL that a text says: relative to another one, if there is one.
 pub(super) fn parse(url: &str, base: Option<&Url>) -> Result<Url, HostFailure> {
@@ -35,18 +31,22 @@ pub(super) fn address(url: &Url) -> String {
     format!("{}:{port}", url.host_str().unwrap_or_default())
 }
 
-/// Gives a machine `%HTTP-URL`: a URL, and one that it is relative to, or `NIL`. Returns the whole URL, the
-/// address to connect to, and the origin.
-pub(super) fn install(machine: &mut Vm) {
-    let function = |arguments: &[Datum]| {
-        let arguments = CallArguments(arguments.to_vec());
-        let base = arguments.text_if_any(1)?.map(|base| parse(&base, None)).transpose()?;
-        let mut url = parse(&arguments.text(0)?, base.as_ref())?;
+/// Adds the function that reads URLs.
+pub(super) fn add(rows: &mut HostRows) {
+    let function = |url: String, base: Option<String>| {
+        let base = base.map(|base| parse(&base, None)).transpose()?;
+        let mut url = parse(&url, base.as_ref())?;
         url.set_fragment(None);
-        let parts = [url.as_str(), &address(&url), &url.origin().ascii_serialization()];
-        Ok(list(parts.map(text)))
+        Ok(vec![url.to_string(), address(&url), url.origin().ascii_serialization()])
     };
-    machine.add_host_function("%HTTP-URL", HostFunction::AtOnce(Box::new(function)));
+    rows.at_once(
+        "%HTTP-URL",
+        ["url", "base"],
+        "Returns the whole URL that URL is, relative to BASE if there is one, the address to connect to, and the \
+         origin.",
+        function,
+    )
+    .everywhere();
 }
 
 /// Returns the text of a part of a target whose escapes are replaced.
@@ -55,8 +55,8 @@ fn decoded(part: &str) -> String {
 }
 
 /// Returns the parts of a path between its slashes, without their escapes.
-pub(super) fn parts(path: &str) -> Vec<Datum> {
-    path.split('/').map(|part| text(&decoded(part))).collect()
+pub(super) fn parts(path: &str) -> Vec<String> {
+    path.split('/').map(decoded).collect()
 }
 
 /// Returns names and values of a query.
@@ -73,14 +73,14 @@ pub(super) fn credentials(url: &Url) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::reason_of;
     use super::*;
-    use crate::data::text_of;
 
     fn said(url: &str, base: Option<&str>) -> String {
         let base = base.map(|base| parse(base, None).expect("the base is right"));
         match parse(url, base.as_ref()) {
             Ok(url) => url.to_string(),
-            Err(failure) => failure.arguments.first().and_then(text_of).unwrap_or_default().into(),
+            Err(failure) => reason_of(&failure),
         }
     }
 
@@ -127,9 +127,7 @@ mod tests {
 
     #[test]
     fn the_parts_of_a_target_lose_their_escapes() {
-        let parts: Vec<String> =
-            parts("/a+b/c%2Fd/%C3%BC%FF").iter().filter_map(text_of).map(str::to_owned).collect();
-        assert_eq!(parts, ["", "a+b", "c/d", "ü\u{FFFD}"]);
+        assert_eq!(parts("/a+b/c%2Fd/%C3%BC%FF"), ["", "a+b", "c/d", "ü\u{FFFD}"]);
         let pair = |name: &str, value: &str| (name.to_owned(), value.to_owned());
         assert_eq!(
             query("a=b+c&d&=e&%C3%BC=1%3D"),

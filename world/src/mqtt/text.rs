@@ -83,9 +83,66 @@ pub(super) fn check_filter(filter: &str) -> Result<(), HostFailure> {
     Ok(())
 }
 
+/// Returns whether a valid filter stands for a topic: `+` for one level, `#` for all that follow, none of the
+/// two for a first level that begins with `$`.
+pub(super) fn matches(filter: &str, topic: &str) -> bool {
+    let shared = filter.strip_prefix(SHARED).and_then(|rest| rest.split_once('/'));
+    let levels = shared.map_or(filter, |(_, levels)| levels);
+    if topic.starts_with('$') && levels.starts_with(['+', '#']) {
+        return false;
+    }
+    let (mut wanted, mut found) = (levels.split('/'), topic.split('/'));
+    loop {
+        match (wanted.next(), found.next()) {
+            (Some("#"), _) | (None, None) => return true,
+            (Some("+"), Some(_)) => {}
+            (Some(wanted), Some(found)) if wanted == found => {}
+            _ => return false,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn filters_stand_for_topics() {
+        for (filter, topics) in [
+            ("a/b", &["a/b"][..]),
+            ("+", &["a", "", "ä", "€"]),
+            ("+/+", &["a/b", "/b", "a/", "/"]),
+            ("/+", &["/b", "/"]),
+            ("#", &["a", "a/b", "/", "ä/b"]),
+            ("a/#", &["a", "a/", "a/b", "a/b/c"]),
+            ("a/+/c", &["a/b/c", "a//c", "a/€/c"]),
+            ("$SYS/#", &["$SYS", "$SYS/a"]),
+            ("$SYS/+", &["$SYS/a"]),
+            ("$share/g/#", &["a", "a/b", "g"]),
+            ("$share/g/a/+", &["a/b"]),
+            ("$share/g//a", &["/a"]),
+            ("$share/g/$SYS/#", &["$SYS/a"]),
+            ("$sharea/+", &["$sharea/b"]),
+        ] {
+            for topic in topics {
+                assert!(matches(filter, topic), "{filter} {topic}");
+            }
+        }
+        for (filter, topics) in [
+            ("a/b", &["a", "a/b/", "a/b/c", "A/b"][..]),
+            ("+", &["a/b", "/a", "$SYS"]),
+            ("+/a", &["$SYS/a", "a", "a/a/a"]),
+            ("#", &["$SYS", "$SYS/a", "$a"]),
+            ("a/#", &["b", "ab", "ab/c"]),
+            ("a/+", &["a", "a/b/c"]),
+            ("$share/g/#", &["$SYS/a"]),
+            ("$share/g/a", &["g/a", "$share/g/a"]),
+        ] {
+            for topic in topics {
+                assert!(!matches(filter, topic), "{filter} {topic}");
+            }
+        }
+    }
 
     fn reason(result: Result<(), HostFailure>) -> Option<String> {
         result.err().map(|failure| failure.arguments[0].to_string())

@@ -7,7 +7,6 @@
 //! A connection reads ahead at most [`super::CHUNK`] bytes; a peer that sends more waits.
 
 use std::collections::BTreeMap;
-use std::future::ready as ready_future;
 use std::io::{Error, ErrorKind};
 use std::pin::{Pin, pin};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,15 +15,13 @@ use std::task::{Context, Poll, Wake, Waker, ready};
 use std::time::Duration;
 
 use esl_bytecode::datum::Datum;
-use esl_host::HostFailure;
+use esl_host::{HostFailure, HostHandle, IntoDatum, Payload};
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, ReadBuf};
 use tokio::net::TcpStream;
 
-use super::{READ, SocketKind, Sockets, closed, lock, socket_failure, unless_closed};
+use super::{NewConnection, READ, Socket, SocketFault, SocketKind, lock, socket_failure, unless_closed};
 use crate::arrived::Arrived;
-use crate::data::{CallArguments, boolean, failure, integer};
 use crate::event_loop;
-use crate::operation::{Completion, OperationFuture};
 
 /// Time that a peer has to take the end of a connection.
 const GOODBYE: Duration = Duration::from_secs(1);
@@ -118,41 +115,41 @@ impl Wake for Waiting {
 
 /// Waits until something has arrived at a connection, or it has ended. Of all operations most are of this
 /// kind, so it is small, and needs no more than a place in a table.
-struct Arrival {
-    connection: Arc<Connection>,
+pub(super) struct Arrival {
+    connection: Result<Arc<Connection>, SocketFault>,
     number: Option<u64>,
 }
 
 impl Future for Arrival {
-    type Output = Completion;
+    type Output = Result<(), HostFailure>;
 
-    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Completion> {
-        let connection = self.connection.clone();
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Result<(), HostFailure>> {
+        let connection = self.connection.clone()?;
         let has_data = || lock(&connection.arrived).is_something();
         if self.number.is_none() && has_data() && !connection.is_closed.load(Ordering::SeqCst) {
             // Nobody need be told of one who does not wait.
-            return Poll::Ready(Ok(Vec::new()));
+            return Poll::Ready(Ok(()));
         }
         // Before anything is asked, so that nothing is missed.
         self.number = Some(connection.waiting.note(self.number, context.waker()));
         if connection.is_closed.load(Ordering::SeqCst) {
-            return Poll::Ready(Err(closed()));
+            return Poll::Ready(Err(SocketFault::Closed.into()));
         }
         if has_data() {
-            return Poll::Ready(Ok(Vec::new()));
+            return Poll::Ready(Ok(()));
         }
         // The system tells one only, who tells the others.
         let waker = Waker::from(connection.waiting.clone());
         let arrival = ready!(connection.poll_arrival(&mut Context::from_waker(&waker)));
         connection.waiting.wake_all();
-        Poll::Ready(arrival.map(|()| Vec::new()).map_err(|error| socket_failure(&error)))
+        Poll::Ready(arrival.map_err(|error| socket_failure(&error)))
     }
 }
 
 impl Drop for Arrival {
     fn drop(&mut self) {
-        if let Some(number) = self.number {
-            self.connection.waiting.forget(number);
+        if let (Some(number), Ok(connection)) = (self.number, &self.connection) {
+            connection.waiting.forget(number);
         }
     }
 }
@@ -188,7 +185,7 @@ impl Connection {
         Connection::with(reader, writer, true)
     }
 
-    pub(super) fn of_tcp(stream: TcpStream) -> (SocketKind, i64, String) {
+    pub(super) fn of_tcp(stream: TcpStream) -> NewConnection {
         let (port, peer) = Connection::ends_of(&stream);
         let (reader, writer) = stream.into_split();
         (Connection::over(reader, writer), port, peer)
@@ -239,16 +236,19 @@ impl Connection {
     }
 }
 
-/// `%SOCKET-CONNECT`: number, address, milliseconds, and for TLS the name of the server and a file of
-/// certificates.
-pub(super) async fn connect(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let (number, address) = (arguments.number(0)?, arguments.text(1)?);
-    let server_name = arguments.text_if_any(3)?;
-    let ca_file = arguments.text_if_any(4)?;
+/// Connects a socket, by the first meaning of the address that answers.
+pub(super) async fn connect(
+    socket: HostHandle<Socket>,
+    address: String,
+    milliseconds: Option<u64>,
+    server_name: Option<String>,
+    ca_file: Option<String>,
+) -> Result<(), HostFailure> {
     let connect = async {
-        let addresses =
-            tokio::net::lookup_host(&address).await.map_err(|error| failure("HOST-NOT-FOUND", error))?;
-        let mut last = failure("HOST-NOT-FOUND", format!("`{address}` has no address"));
+        let addresses = tokio::net::lookup_host(&address)
+            .await
+            .map_err(|error| HostFailure::new("HOST-NOT-FOUND", error))?;
+        let mut last = HostFailure::new("HOST-NOT-FOUND", format!("`{address}` has no address"));
         for address in addresses {
             match TcpStream::connect(address).await {
                 Ok(stream) => return secured(stream, server_name, ca_file).await,
@@ -257,14 +257,15 @@ pub(super) async fn connect(arguments: CallArguments, sockets: Sockets) -> Compl
         }
         Err(last)
     };
-    let (kind, port, peer) = if arguments.is_true(2) {
-        let time = Duration::from_millis(u64::try_from(arguments.integer(2)?).unwrap_or(0));
-        let late = |_| Err(failure("TIMEOUT", format!("`{address}` does not answer")));
-        tokio::time::timeout(time, connect).await.unwrap_or_else(late)?
-    } else {
-        connect.await?
+    let connection = match milliseconds {
+        Some(milliseconds) => {
+            let late = |_| Err(HostFailure::new("TIMEOUT", format!("`{address}` does not answer")));
+            let time = Duration::from_millis(milliseconds);
+            tokio::time::timeout(time, connect).await.unwrap_or_else(late)?
+        }
+        None => connect.await?,
     };
-    sockets.set(number, kind, port, peer)
+    socket.set(connection)
 }
 
 /// Returns a connection over TCP, secured by TLS if the server has a name.
@@ -273,7 +274,7 @@ async fn secured(
     stream: TcpStream,
     server_name: Option<String>,
     ca_file: Option<String>,
-) -> Result<(SocketKind, i64, String), HostFailure> {
+) -> Result<NewConnection, HostFailure> {
     let Some(name) = server_name else { return Ok(Connection::of_tcp(stream)) };
     let (port, peer) = Connection::ends_of(&stream);
     Ok((Connection::secured(crate::tls::begin(stream, &name, ca_file).await?), port, peer))
@@ -285,50 +286,40 @@ async fn secured(
     stream: TcpStream,
     server_name: Option<String>,
     _ca_file: Option<String>,
-) -> Result<(SocketKind, i64, String), HostFailure> {
+) -> Result<NewConnection, HostFailure> {
     match server_name {
         None => Ok(Connection::of_tcp(stream)),
-        Some(_) => Err(failure("TLS-ERROR", "this program was built without TLS")),
+        Some(_) => Err(HostFailure::new("TLS-ERROR", "this program was built without TLS")),
     }
 }
 
 #[cfg(unix)]
-pub(super) async fn connect_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
+pub(super) async fn connect_unix(socket: HostHandle<Socket>, path: String) -> Result<(), HostFailure> {
     let stream = tokio::net::UnixStream::connect(&path).await.map_err(|error| socket_failure(&error))?;
     let (reader, writer) = stream.into_split();
-    sockets.set(number, Connection::over(reader, writer), 0, path)
+    socket.set((Connection::over(reader, writer), 0, path))
 }
 
-/// `%SOCKET-AWAIT`: waits until there is something to be taken.
-pub(super) fn wait(arguments: &CallArguments, sockets: &Sockets) -> OperationFuture {
-    let socket = arguments.number(0).and_then(|number| sockets.get(number));
-    match socket.and_then(|socket| socket.connection()) {
-        Ok(connection) => Box::pin(Arrival { connection, number: None }),
-        Err(failure) => Box::pin(ready_future(Err(failure))),
-    }
+/// Waits until there is something to be taken.
+pub(super) fn wait(socket: HostHandle<Socket>) -> Arrival {
+    Arrival { connection: socket.connection(), number: None }
 }
 
-/// `%SOCKET-SEND`: number, text, whether its characters are bytes. Writes as far as the system takes it
-/// without delay. Returns `NIL` if that was all; otherwise `T` if the rest is kept, and 0 if somebody else
-/// writes.
-pub(super) fn send(arguments: CallArguments, sockets: &Sockets) -> Result<Datum, HostFailure> {
-    let connection = sockets.get(arguments.number(0)?)?.connection()?;
-    let bytes = arguments.bytes_or_text(1, 2)?;
-    let Ok(mut writer) = connection.writer.try_lock() else { return Ok(integer(0)) };
-    let is_written = writer.write_at_once(&bytes).map_err(|error| socket_failure(&error))?;
-    Ok(boolean(!is_written))
-}
-
-/// `%SOCKET-WRITE`: number, text, whether its characters are bytes. Writes what is kept first.
-pub(super) async fn write(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let socket = sockets.get(arguments.number(0)?)?;
+/// Writes contents as far as the system takes them without delay. Returns `NIL` if that was all; otherwise
+/// `T` if the rest is kept, and 0 if another task writes.
+pub(super) fn send(socket: HostHandle<Socket>, Payload(bytes): Payload) -> Result<Datum, HostFailure> {
     let connection = socket.connection()?;
-    let bytes = arguments.bytes_or_text(1, 2)?;
+    let Ok(mut writer) = connection.writer.try_lock() else { return Ok(0_i64.into_datum()) };
+    let is_written = writer.write_at_once(&bytes).map_err(|error| socket_failure(&error))?;
+    Ok((!is_written).into_datum())
+}
+
+/// Writes what is kept, then contents.
+pub(super) async fn write(socket: HostHandle<Socket>, Payload(bytes): Payload) -> Result<(), HostFailure> {
+    let connection = socket.connection()?;
     let mut write = pin!(async {
         let written = connection.writer.lock().await.write(&bytes).await;
         written.map_err(|error| socket_failure(&error))
     });
-    unless_closed(socket.closing.subscribe(), write.as_mut()).await?;
-    Ok(Vec::new())
+    unless_closed(socket.closing.subscribe(), write.as_mut()).await
 }

@@ -5,12 +5,13 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
-use esl_host::HostFailure;
+use esl_host::{HostFailure, HostHandle};
 use tokio::net::{TcpListener, TcpSocket};
 
-use super::{Connection, NewConnection, SocketKind, Sockets, lock, socket_failure, unless_closed};
-use crate::data::{CallArguments, failure};
-use crate::operation::Completion;
+use super::{
+    Connection, NewConnection, Socket, SocketFault, SocketKind, close_untaken, lock, socket_failure,
+    unless_closed,
+};
 
 /// Time that a peer has to prove who it is, and to be shown who we are.
 #[cfg(feature = "tls")]
@@ -47,13 +48,15 @@ impl Drop for Listener {
 #[cfg(feature = "tls")]
 pub(crate) type Greetings = tokio::sync::Mutex<tokio::task::JoinSet<Option<NewConnection>>>;
 
-/// `%SOCKET-LISTEN`: number, address, files of certificate and key if it is secured.
-pub(super) async fn listen(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let secured = match (arguments.text_if_any(2)?, arguments.text_if_any(3)?) {
-        (Some(certificate), Some(key)) => Some((certificate, key)),
-        _ => None,
-    };
-    let listener = bind(&arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
+/// Has a socket listen. There are files of certificate and key if it is secured.
+pub(super) async fn listen(
+    socket: HostHandle<Socket>,
+    address: String,
+    certificate: Option<String>,
+    key: Option<String>,
+) -> Result<(), HostFailure> {
+    let secured = certificate.zip(key);
+    let listener = bind(&address).await.map_err(|error| bind_failure(&error))?;
     let port = listener.local_addr().map_or(0, |address| address.port().into());
     let listener = match secured {
         None => Listener::Tcp(listener),
@@ -62,14 +65,9 @@ pub(super) async fn listen(arguments: CallArguments, sockets: Sockets) -> Comple
             Listener::Secured(listener, crate::tls::acceptor(certificate, key).await?, Greetings::default())
         }
         #[cfg(not(feature = "tls"))]
-        Some(_) => return Err(failure("TLS-ERROR", "this program was built without TLS")),
+        Some(_) => return Err(HostFailure::new("TLS-ERROR", "this program was built without TLS")),
     };
-    sockets.set(
-        arguments.number(0)?,
-        SocketKind::Listener(Arc::new(listener), Arc::default()),
-        port,
-        String::new(),
-    )
+    socket.set((SocketKind::Listener(Arc::new(listener), Arc::default()), port, String::new()))
 }
 
 /// Returns a listener on the first of an address' meanings that can be had.
@@ -152,33 +150,35 @@ async fn accept_secured(
 /// Returns the failure for an address that cannot be used here.
 pub(crate) fn bind_failure(error: &Error) -> HostFailure {
     // What the resolver says is no error of the system.
-    if error.raw_os_error().is_none() { failure("HOST-NOT-FOUND", error) } else { socket_failure(error) }
+    if error.raw_os_error().is_none() {
+        HostFailure::new("HOST-NOT-FOUND", error)
+    } else {
+        socket_failure(error)
+    }
 }
 
 #[cfg(unix)]
-pub(super) async fn listen_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
+pub(super) async fn listen_unix(socket: HostHandle<Socket>, path: String) -> Result<(), HostFailure> {
     let bind = || {
-        let socket = tokio::net::UnixSocket::new_stream()?;
-        socket.bind(&path)?;
-        socket.listen(BACKLOG)
+        let listener = tokio::net::UnixSocket::new_stream()?;
+        listener.bind(&path)?;
+        listener.listen(BACKLOG)
     };
     let listener = bind().map_err(|error| socket_failure(&error))?;
     let kind = SocketKind::Listener(Arc::new(Listener::Unix(listener, path.into())), Arc::default());
-    sockets.set(number, kind, 0, String::new())
+    socket.set((kind, 0, String::new()))
 }
 
-/// `%SOCKET-ACCEPT`: waits until a connection is there to be taken.
-pub(super) async fn accept(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let socket = sockets.get(arguments.number(0)?)?;
-    let SocketKind::Listener(listener, accepted) = &socket.kind else {
-        return Err(failure("SOCKET-ERROR", "it is no listener"));
+/// Waits until a connection is there to be taken.
+pub(super) async fn accept(socket: HostHandle<Socket>) -> Result<(), HostFailure> {
+    let SocketKind::Listener(listener, accepted) = socket.kind()? else {
+        return Err(SocketFault::NotListening.into());
     };
-    if !lock(accepted).is_empty() {
-        return Ok(Vec::new());
+    if !lock(&accepted).is_empty() {
+        return Ok(());
     }
     let mut coming = pin!(async {
-        match &**listener {
+        match &*listener {
             Listener::Tcp(listener) => {
                 let (stream, _) = next(|| listener.accept()).await?;
                 Ok(Connection::of_tcp(stream))
@@ -195,12 +195,11 @@ pub(super) async fn accept(arguments: CallArguments, sockets: Sockets) -> Comple
             }
         }
     });
-    let (kind, port, peer) = unless_closed(socket.closing.subscribe(), coming.as_mut()).await?;
-    let number = sockets.add(kind, port, peer);
-    lock(accepted).push_back(number);
+    let connection = unless_closed(socket.closing.subscribe(), coming.as_mut()).await?;
+    lock(&accepted).push_back(connection);
     if *socket.closing.borrow() {
         // The listener was closed at this moment, and may not have seen it.
-        sockets.close_untaken(accepted);
+        close_untaken(&accepted);
     }
-    Ok(Vec::new())
+    Ok(())
 }

@@ -2,102 +2,99 @@
 //!
 //! A path is watched, not the file that it stands for at the beginning: see `follower`.
 
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use esl_bytecode::datum::Datum;
-use esl_bytecode::span::Span;
-use esl_host::{HostFailure, Right};
-use esl_vm::embed::{HostFunction, Need};
-use esl_vm::vm::Vm;
+use esl_host::{
+    HostFailure, HostHandle, HostInput, HostObject, HostRows, Inbox, IntoDatum, Keyword, Right, Sender,
+    Values,
+};
 use notify::Event;
-use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
-use tokio::sync::{Notify, oneshot};
+use tokio::sync::mpsc::{Receiver, channel};
+use tokio::sync::oneshot;
 
-use crate::data::{CallArguments, Numbered, failure, integer, nil, text};
 use crate::event_loop;
-use crate::operation::define;
+use crate::operation::spawned;
 
 mod follower;
 
 use follower::{Follower, PathChange};
 
-/// Most changes that are kept for the program.
+/// Most events of the system that wait until there is room in the input for the changes before them. When
+/// there are more, changes are lost, and the input is signalled with that.
 const MOST_KEPT: usize = 10_000;
 
-/// Changes that the program has not taken: what has happened, and to which path.
+/// A path that is watched, until this is closed or dropped.
 #[derive(Default)]
-struct Changes {
-    kept: Mutex<VecDeque<(&'static str, String)>>,
-    came: Notify,
+struct WatchSlot(Mutex<Option<oneshot::Sender<()>>>);
+
+impl HostObject for WatchSlot {
+    const KIND: &'static str = "WATCH";
 }
 
-impl Changes {
-    fn kept(&self) -> MutexGuard<'_, VecDeque<(&'static str, String)>> {
+impl WatchSlot {
+    fn set(&self, ending: Option<oneshot::Sender<()>>) {
         // It is whole at every moment, so a panic elsewhere does not corrupt it.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = ending;
+    }
+}
+
+/// A path that is being followed, and the events of the system about it.
+struct Following {
+    /// `None` only while a thread has it.
+    follower: Option<Follower>,
+    events: Receiver<Event>,
+    /// Whether events were lost.
+    has_lost: Arc<AtomicBool>,
+    input: HostInput,
+}
+
+impl Following {
+    /// Begins to watch a path.
+    fn begin(path: String, input: HostInput) -> notify::Result<Following> {
+        let has_lost = Arc::<AtomicBool>::default();
+        let loses = has_lost.clone();
+        let (sender, events) = channel(MOST_KEPT);
+        let watcher = notify::recommended_watcher(move |event: notify::Result<Event>| {
+            // After the end nobody wants to know.
+            if !event.is_ok_and(|event| !event.need_rescan() && sender.try_send(event).is_ok()) {
+                loses.store(true, Ordering::Relaxed);
+            }
+        })?;
+        let follower = Some(Follower::new(watcher, path.into())?);
+        Ok(Following { follower, events, has_lost, input })
     }
 
-    fn add(&self, changes: Vec<PathChange>) {
-        if changes.is_empty() {
-            return;
+    /// Signals the input with the changes of the path, until the system tells no more of it.
+    async fn run(mut self) {
+        while let Some(event) = self.events.recv().await {
+            let changes = self.changes(event).await;
+            if self.has_lost.swap(false, Ordering::Relaxed) {
+                // Those behind are old as well.
+                while let Ok(event) = self.events.try_recv() {
+                    self.changes(event).await;
+                }
+                self.signal("LOST", "").await;
+                continue;
+            }
+            for (kind, path) in changes {
+                self.signal(kind, &path.to_string_lossy()).await;
+            }
         }
-        let mut kept = self.kept();
-        kept.extend(changes.into_iter().map(|(kind, path)| (kind, path.to_string_lossy().into_owned())));
-        let is_full = kept.len() > MOST_KEPT;
-        drop(kept);
-        if is_full {
-            return self.lose();
-        }
-        self.came.notify_waiters();
     }
 
-    /// Notes that changes were lost.
-    fn lose(&self) {
-        let mut kept = self.kept();
-        kept.clear();
-        kept.push_back(("LOST", String::new()));
-        drop(kept);
-        self.came.notify_waiters();
+    async fn signal(&self, kind: &'static str, path: &str) {
+        // The program may have closed the input.
+        _ = self.input.signal(vec![Keyword(kind).into_datum(), path.into_datum()]).await;
     }
-}
 
-/// A path that is watched, until this is dropped.
-struct Watched {
-    changes: Arc<Changes>,
-    _ending: oneshot::Sender<()>,
-}
-
-/// Begins to watch a path. Returns its changes, the events of the system, and what follows the path.
-fn begin(path: String) -> notify::Result<(Arc<Changes>, Follower, UnboundedReceiver<Event>)> {
-    let changes = Arc::<Changes>::default();
-    let heard = changes.clone();
-    let (sender, events) = unbounded_channel();
-    let watcher = notify::recommended_watcher(move |event: notify::Result<Event>| match event {
-        // Nobody listens after the end.
-        Ok(event) if !event.need_rescan() => _ = sender.send(event),
-        _ => heard.lose(),
-    })?;
-    let follower = Follower::new(watcher, path.into())?;
-    Ok((changes, follower, events))
-}
-
-/// Follows a path until the other end of `ending` is dropped.
-async fn follow(
-    changes: Arc<Changes>,
-    mut follower: Follower,
-    mut events: UnboundedReceiver<Event>,
-    mut ending: oneshot::Receiver<()>,
-) {
-    loop {
-        let event = tokio::select! {
-            _ = &mut ending => return,
-            event = events.recv() => event,
-        };
-        let Some(event) = event else { return };
+    /// Returns the changes that an event reports.
+    async fn changes(&mut self, event: Event) -> Vec<PathChange> {
+        let Some(mut follower) = self.follower.take() else { return Vec::new() };
         if !follower.concerns(&event) {
-            changes.add(follower.changes(&event));
-            continue;
+            let changes = follower.changes(&event);
+            self.follower = Some(follower);
+            return changes;
         }
         // The watcher has to be asked from another thread than its own, and the system may take its time.
         let followed = tokio::task::spawn_blocking(move || {
@@ -105,89 +102,58 @@ async fn follow(
             (follower, found)
         });
         match followed.await {
-            Ok((next, found)) => {
-                follower = next;
-                changes.add(found);
+            Ok((follower, found)) => {
+                self.follower = Some(follower);
+                found
             }
-            Err(_) => return changes.lose(),
+            Err(_) => {
+                self.events.close();
+                self.has_lost.store(true, Ordering::Relaxed);
+                Vec::new()
+            }
         }
     }
 }
 
-/// The watched paths of a machine, by number, and the greatest number so far.
-#[derive(Clone, Default)]
-struct Watches(Arc<Mutex<Numbered<Watched>>>);
-
-impl Watches {
-    fn lock(&self) -> MutexGuard<'_, Numbered<Watched>> {
-        // As above.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn get(&self, number: i64) -> Result<Arc<Changes>, HostFailure> {
-        let watches = self.lock();
-        let watched = watches.1.get(&number).and_then(Option::as_ref);
-        watched.map(|watched| watched.changes.clone()).ok_or_else(|| failure("CANCELLED", ""))
-    }
-}
-
-/// Gives a machine the operations of `watch-path`.
-pub(crate) fn install(machine: &mut Vm) {
-    let watches = Watches::default();
-    let mut define_immediate =
-        |name: &str, function: fn(CallArguments, &Watches) -> Result<Datum, HostFailure>| {
-            let watches = watches.clone();
-            let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()), &watches);
-            machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
-        };
-    define_immediate("%WATCH-NEW", |_, watches| {
-        let mut watches = watches.lock();
-        watches.0 += 1;
-        let number = watches.0;
-        watches.1.insert(number, None);
-        Ok(integer(number))
+/// Returns the functions of `watch-path`, which the library calls by their names.
+pub(crate) fn rows(inbox: &Inbox) -> HostRows {
+    let mut rows = HostRows::new(inbox);
+    let mut made = 0;
+    rows.at_once("%WATCH-NEW", [], "Returns a watch of no path.", move || {
+        made += 1;
+        Ok(HostHandle::new(made, WatchSlot::default()))
     });
-    define_immediate("%WATCH-TAKE", |arguments, watches| {
-        let next = watches.get(arguments.integer(0)?)?.kept().pop_front();
-        Ok(next.map_or_else(nil, |(kind, path)| Datum::list([text(kind), text(&path)], Span::default())))
+    rows.at_once("%WATCH-CLOSE", ["watch"], "Ends WATCH.", |watch: HostHandle<WatchSlot>| {
+        watch.set(None);
+        Ok(())
     });
-    define_immediate("%WATCH-CLOSE", |arguments, watches| {
-        let watched = watches.lock().1.remove(&arguments.integer(0)?);
-        drop(watched);
-        Ok(nil())
-    });
-    let known = watches.clone();
-    let read = [Need { right: Right::Read, argument: 1 }];
-    define(machine, "%WATCH-OPEN", &read, move |arguments| {
-        let known = known.clone();
-        async move {
-            let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
-            let begun = tokio::task::spawn_blocking(move || begin(path)).await;
-            match begun.map_err(|error| failure("SIMPLE-ERROR", error))? {
-                Ok((changes, follower, events)) => {
-                    let (ending, end) = oneshot::channel();
-                    let following = follow(changes.clone(), follower, events, end);
-                    event_loop::spawn(following).map_err(|error| failure("SIMPLE-ERROR", error))?;
-                    if let Some(place) = known.lock().1.get_mut(&number) {
-                        *place = Some(Watched { changes, _ending: ending });
-                    }
-                    Ok(vec![integer(number)])
+    rows.operation(
+        spawned,
+        "%WATCH-OPEN",
+        ["watch", "input", "path"],
+        "Has the input with the name INPUT signalled with the changes of PATH: a keyword and a path. Returns NIL and \
+         the reason if the system does not watch it.",
+        |sender: Sender, watch: HostHandle<WatchSlot>, input: HostInput, path: String| async move {
+            let failed = |reason: &dyn ToString| HostFailure::new("SIMPLE-ERROR", reason.to_string());
+            let begun = tokio::task::spawn_blocking(move || Following::begin(path, input)).await;
+            match begun.map_err(|error| failed(&error))? {
+                Ok(following) => {
+                    let (ending, mut end) = oneshot::channel();
+                    let follow = async move {
+                        tokio::select! {
+                            _ = &mut end => {}
+                            () = following.run() => {}
+                        }
+                        drop(sender);
+                    };
+                    event_loop::spawn(follow).map_err(|error| failed(&error))?;
+                    watch.set(Some(ending));
+                    Ok(Values(vec![true.into_datum()]))
                 }
-                Err(error) => Ok(vec![nil(), text(&error.to_string())]),
+                Err(error) => Ok(Values(vec![().into_datum(), error.to_string().into_datum()])),
             }
-        }
-    });
-    define(machine, "%WATCH-AWAIT", &[], move |arguments| {
-        let changes = arguments.integer(0).and_then(|number| watches.get(number));
-        async move {
-            let changes = changes?;
-            loop {
-                let came = changes.came.notified();
-                if !changes.kept().is_empty() {
-                    return Ok(Vec::new());
-                }
-                came.await;
-            }
-        }
-    });
+        },
+    )
+    .needs(Right::Read, "path");
+    rows
 }

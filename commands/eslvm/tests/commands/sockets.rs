@@ -356,7 +356,7 @@ fn of_many_who_wait_for_a_connection_none_is_forgotten() {
 (defvar *closed* 0)
 (let ((listener (sockets:listen \"127.0.0.1\" 0)))
   (sockets:with-socket (connection (sockets:connect \"127.0.0.1\" (sockets:local-port listener)))
-    (let ((peer (sockets:accept listener)) (number (sockets::number-of connection)))
+    (let ((peer (sockets:accept listener)) (number (sockets::handle-of connection)))
       (flet ((wait-many ()
                (let ((waiting (loop repeat 200 collect (start (sockets::%socket-await number)))))
                  (sleep 0.01)
@@ -385,7 +385,7 @@ fn connections_that_nobody_takes_end_with_their_listener() {
   (let ((first (sockets:accept listener)))
     (read-line first)
     ;; As by a call that is left at the moment at which the second one comes.
-    (sockets::%socket-accept (sockets::number-of listener))
+    (sockets::%socket-accept (sockets::handle-of listener))
     (close listener)
     (write-line \"closed\" first)
     (finish-output first)
@@ -488,11 +488,11 @@ fn texts_of_several_tasks_are_not_mixed_when_the_peer_is_slow() {
     let text = format!(
         "(require :sockets)
 (sockets:with-socket (c (sockets:connect \"127.0.0.1\" {port}))
-  (let ((number (sockets::number-of c)))
+  (let ((number (sockets::handle-of c)))
     (mapc #'wait-for-task
           (loop for i below 8
                 collect (let ((line (format nil \"~a~%\" (make-string 50000 :initial-element (digit-char i)))))
-                          (spawn (dotimes (i 40) (sockets::send number line nil))))))
+                          (spawn (dotimes (i 40) (sockets::send number line))))))
     (print 'sent)))"
     );
     check("sockets-mixed", &text, &["--allow-net", "--slice", "1"], &["SENT"]);

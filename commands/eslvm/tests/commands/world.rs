@@ -238,3 +238,36 @@ fn a_path_is_watched() {
     ];
     check("watch-path", text, &[], &expected);
 }
+
+/// The row of a function of the host is all that ESL knows of it: its parameters, its docstring, and the
+/// types of its arguments.
+#[test]
+fn functions_of_the_host_are_defined_by_their_rows() {
+    let text = "(require :sockets)
+(print (documentation 'sockets::%socket-send 'function))
+(print (documentation 'sockets::%socket-await 'function))
+(defmacro fault (form)
+  `(print (handler-case ,form
+            (type-error (e) (list (type-error-datum e) (type-error-expected-type e)))
+            (failure (f) (failure-cause f)))))
+(fault (sockets::%socket-port 7))
+(fault (sockets::%socket-take-bytes (sockets::%socket-new) -1))
+(fault (sockets::%socket-send (sockets::%socket-new) 'text))
+(fault (sockets::%socket-await (sockets::%socket-new)))
+(print (sockets::%socket-new))
+(let ((socket (sockets::%socket-new)))
+  (sockets::%socket-close socket)
+  (fault (sockets::%socket-port socket)))";
+    let expected = [
+        "\"Writes CONTENTS, a text or bytes, as far as the system takes them without delay. Returns NIL if that was \
+         all; otherwise T if the rest is kept, and 0 if somebody else writes.\"",
+        "\"Waits for data.\"",
+        "(7 SOCKET)",
+        "(-1 (INTEGER 0 18446744073709551615))",
+        "(TEXT VECTOR)",
+        ":SOCKET-ERROR",
+        "#<SOCKET 4>",
+        ":SOCKET-CLOSED",
+    ];
+    check("world-rows", text, &[], &expected);
+}

@@ -1,0 +1,138 @@
+//! Inputs of a program that the host itself signals: a driver pushes arrivals, and waits while there is no
+//! room.
+
+use std::fmt;
+use std::future::poll_fn;
+use std::sync::Arc;
+
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+
+use super::argument::{ArgumentReader, FromCall};
+use super::door::DoorEntry;
+use super::{HostFailure, Inbox, Incoming, SendError};
+
+/// Most signals of one input that are on their way to the machine, whatever its rule is: a driver that is
+/// faster than the machine waits.
+const MOST_SENT: usize = 1000;
+
+/// An input of a program, which the program has named in a call. Unlike a [`Sender`](super::Sender) it does
+/// not keep a program that waits from being deadlocked.
+#[derive(Clone)]
+pub struct HostInput {
+    inbox: Inbox,
+    name: Arc<str>,
+}
+
+impl fmt::Debug for HostInput {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("HostInput").field(&self.name).finish()
+    }
+}
+
+impl HostInput {
+    /// Returns the input with this name, as it is spelt in the program.
+    pub fn new(inbox: &Inbox, name: &str) -> HostInput {
+        HostInput { inbox: inbox.clone(), name: name.into() }
+    }
+
+    /// Returns the name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Signals the input. Waits while there is no room for the signal: if the rule of the input is that
+    /// senders wait, or if too many signals are on their way.
+    ///
+    /// # Errors
+    /// [`SendError::NoSuchInput`], if the program has removed it, and [`SendError::Ended`].
+    pub async fn signal(&self, arguments: Vec<Datum>) -> Result<(), SendError> {
+        poll_fn(|context| {
+            let entry = DoorEntry { limit: Some(MOST_SENT), waker: Some(context.waker()) };
+            self.inbox.doors().poll_enter(&self.name, entry)
+        })
+        .await?;
+        self.put(arguments);
+        Ok(())
+    }
+
+    /// Signals the input, as [`HostInput::signal`], without waiting.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn try_signal(&self, arguments: Vec<Datum>) -> Result<(), SendError> {
+        let entry = DoorEntry { limit: Some(MOST_SENT), waker: None };
+        match self.inbox.doors().poll_enter(&self.name, entry) {
+            std::task::Poll::Ready(entered) => entered?,
+            std::task::Poll::Pending => return Err(SendError::Full(self.name.to_string())),
+        }
+        self.put(arguments);
+        Ok(())
+    }
+
+    fn put(&self, arguments: Vec<Datum>) {
+        self.inbox.put(Incoming::Message { input: self.name.to_string(), arguments });
+    }
+}
+
+/// An argument that is the name of an input, a string.
+impl FromCall for HostInput {
+    const COUNT: usize = 1;
+
+    fn from_call(call: &mut ArgumentReader<'_>) -> Result<HostInput, HostFailure> {
+        match call.next_datum().map(Datum::kind) {
+            Some(DatumKind::String(name)) => Ok(HostInput::new(call.inbox(), name)),
+            Some(other) => Err(HostFailure::of_type(&Datum::new(other.clone(), Span::default()), "STRING")),
+            None => Err(HostFailure::of_type(&Datum::nil(Span::default()), "STRING")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::pin::pin;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::task::{Context, Poll, Wake, Waker};
+
+    #[derive(Default)]
+    struct Count(AtomicUsize);
+
+    impl Wake for Count {
+        fn wake(self: Arc<Count>) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    #[test]
+    fn a_driver_waits_for_room_and_is_woken() {
+        let inbox = Inbox::new();
+        let input = HostInput::new(&inbox, "scan 1");
+        assert_eq!(input.try_signal(Vec::new()), Err(SendError::NoSuchInput("scan 1".into())));
+        inbox.open_door("scan 1", Some(1));
+        assert_eq!(input.try_signal(Vec::new()), Ok(()));
+        assert_eq!(input.try_signal(Vec::new()), Err(SendError::Full("scan 1".into())));
+        let woken = Arc::new(Count::default());
+        let waker = Waker::from(woken.clone());
+        let mut context = Context::from_waker(&waker);
+        let mut signal = pin!(input.signal(Vec::new()));
+        assert_eq!(signal.as_mut().poll(&mut context), Poll::Pending);
+        inbox.note_arrival("scan 1");
+        assert_eq!(woken.0.load(Ordering::Relaxed), 1);
+        assert_eq!(signal.as_mut().poll(&mut context), Poll::Ready(Ok(())));
+        assert_eq!(inbox.take().len(), 2);
+        let mut signal = pin!(input.signal(Vec::new()));
+        assert_eq!(signal.as_mut().poll(&mut context), Poll::Pending);
+        inbox.remove_door("scan 1");
+        assert!(matches!(signal.as_mut().poll(&mut context), Poll::Ready(Err(SendError::NoSuchInput(_)))));
+    }
+
+    #[test]
+    fn signals_on_their_way_are_bounded_whatever_the_rule() {
+        let inbox = Inbox::new();
+        inbox.open_door("A", None);
+        let input = HostInput::new(&inbox, "A");
+        let sent = std::iter::repeat_with(|| input.try_signal(Vec::new())).take_while(Result::is_ok).count();
+        assert_eq!(sent, MOST_SENT);
+    }
+}

@@ -1,0 +1,63 @@
+//! Data at the border to the embedder: values as data and data as values, with the work that this takes.
+
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+
+use super::walk::plain_kind;
+use super::{DatumError, Unit, packed};
+use crate::heap::{AllocError, Heap};
+use crate::names::Names;
+use crate::value::Value;
+
+/// Bytes of a text that are moved in the time of one unit of work.
+const BYTES_TOGETHER: usize = 4;
+
+/// Returns a value as data, and the work that it took.
+///
+/// # Errors
+/// [`DatumError`].
+pub(crate) fn export(heap: &Heap, names: &Names, value: Value) -> Result<(Datum, usize), DatumError> {
+    // An atom shares nothing with other parts, so it needs neither walk nor memory.
+    let plain = || Some(Datum::new(plain_kind(heap, value)?, Span::default()));
+    if let Some(datum) = names.opaque_of(heap, value).cloned().or_else(plain) {
+        let work = work_of(&datum);
+        return Ok((datum, work));
+    }
+    if let Some(vector) = packed::vector_of(heap, value)? {
+        let work = vector.work();
+        return Ok((Datum::new(DatumKind::Packed(vector), Span::default()), work));
+    }
+    let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
+    if names.is_symbol(heap, value) {
+        return Ok((unit.atom_datum(heap, names, value, Span::default()), 1));
+    }
+    Ok((unit.datum_of(heap, names, value, Span::default())?, unit.take_work() as usize))
+}
+
+/// Returns the work of moving a datum that is not compound.
+pub(super) fn work_of(datum: &Datum) -> usize {
+    match datum.kind() {
+        DatumKind::String(text) => 1 + text.len() / BYTES_TOGETHER,
+        DatumKind::Packed(vector) => vector.work(),
+        _ => 1,
+    }
+}
+
+/// Returns data as a value, and the work that it took.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn import(
+    heap: &mut Heap,
+    names: &mut Names,
+    datum: &Datum,
+) -> Result<(Value, usize), AllocError> {
+    if let DatumKind::String(text) = datum.kind() {
+        return Ok((heap.alloc_str(text)?, work_of(datum)));
+    }
+    let mut unit = Unit::default();
+    if !datum.is_compound() {
+        return Ok((unit.atom_value(heap, names, datum)?, work_of(datum)));
+    }
+    Ok((unit.value_of(heap, names, datum)?, unit.take_work() as usize))
+}
