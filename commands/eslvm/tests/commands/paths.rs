@@ -142,7 +142,7 @@ fn a_package_that_a_loaded_file_makes_is_explained() {
         ("good.lisp", "(require \"package\")\n(in-package :p)\n(print (package-name *package*))"),
     ];
     let folder = Folder::with("load-package", &files);
-    for (file, said) in [("main.lisp", "(require \"NAME\")"), ("quick.lisp", "no Quicklisp and ASDF")] {
+    for (file, said) in [("main.lisp", "(require \"NAME\")"), ("quick.lisp", "neither Quicklisp nor ASDF")] {
         let run = process::run(eslvm(&["run", file]).current_dir(folder.path()), "");
         assert_eq!(run.status, Some(3), "{}", run.errors);
         let errors = run.errors.split_whitespace().collect::<Vec<_>>().join(" ");
