@@ -151,7 +151,7 @@ enum EslcAction {
     },
     /// Start the language server, which editors talk to over standard input and output
     Lsp {
-        /// Taken for the sake of editors that name the way of talking
+        /// Ignored; some editors pass it to name the transport
         #[arg(long, hide = true)]
         stdio: bool,
         #[command(flatten)]

@@ -36,24 +36,24 @@ use esl_vm::vm::Vm;
 /// Options by which a run can be operated from outside.
 #[derive(Args, Clone, Debug, Default)]
 pub struct OperateOptions {
-    /// Serve figures of the run to Prometheus at this port, of 127.0.0.1 unless an address comes before it
+    /// Serve metrics of the run to Prometheus at a port of 127.0.0.1, or at ADDRESS:PORT
     #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = parse_address)]
     metrics: Option<SocketAddr>,
-    /// Let operators attach to the run, by `eslvm attach`, at the path of a socket that only its owner can
-    /// open, or at a port, of 127.0.0.1 unless an address comes before it, which asks for a secret
+    /// Let operators attach to the run with `eslvm attach`: at the path of a socket that only its owner can
+    /// open; or at a port of 127.0.0.1 or ADDRESS:PORT, which requires a secret
     #[arg(long, value_name = "PATH|[ADDRESS:]PORT")]
     listen: Option<String>,
-    /// Show the run in a browser, at a port of 127.0.0.1 unless an address comes before it; any free one
-    /// without a number
+    /// Show the run in a browser, at a port of 127.0.0.1 or at ADDRESS:PORT; at any free port without a
+    /// number
     #[arg(long, value_name = "[ADDRESS:]PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0",
           value_parser = parse_address)]
     monitor: Option<SocketAddr>,
     /// File with the secrets of the roles: lines such as `observe SECRET`, `command SECRET` and `patch
-    /// SECRET`; without it they are made anew for each run, and printed
+    /// SECRET`; without it each run generates new secrets and prints them
     #[arg(long, value_name = "FILE")]
     secrets: Option<PathBuf>,
-    /// Have all that listens at a port speak TLS, with the certificates of this file, in PEM; an address that
-    /// other machines reach asks for it
+    /// Secure all ports with TLS, by the certificates of this file, in PEM; required for an address that
+    /// other machines reach
     #[arg(long, value_name = "FILE", requires = "key")]
     certificate: Option<PathBuf>,
     /// File with the key of the certificate, in PEM

@@ -14,25 +14,25 @@ const ALL: &str = "\0";
 /// A value is a list with commas; without one, everything of the kind is granted.
 #[derive(Args, Clone, Debug, Default)]
 pub struct RightsOptions {
-    /// Let the program read these files and folders, or all; those below the current folder it may always
+    /// Permit reading these files and folders, or all; reading below the current folder is always permitted
     #[arg(long, value_name = "PATH,…", num_args = 0..=1, require_equals = true, default_missing_value = ALL, help_heading = "Rights")]
     allow_read: Vec<String>,
-    /// Let the program write these files and folders, or all; those below the current folder it may always
+    /// Permit writing these files and folders, or all; writing below the current folder is always permitted
     #[arg(long, value_name = "PATH,…", num_args = 0..=1, require_equals = true, default_missing_value = ALL, help_heading = "Rights")]
     allow_write: Vec<String>,
-    /// Let the program talk with these hosts, or all
+    /// Permit network access to these hosts, or all
     #[arg(long, value_name = "HOST:PORT,…", num_args = 0..=1, require_equals = true, default_missing_value = ALL, help_heading = "Rights")]
     allow_net: Vec<String>,
-    /// Let the program run these programs, or all
+    /// Permit running these programs, or all
     #[arg(long, value_name = "COMMAND,…", num_args = 0..=1, require_equals = true, default_missing_value = ALL, help_heading = "Rights")]
     allow_run: Vec<String>,
-    /// Let the program read these variables of the environment, or all
+    /// Permit reading these environment variables, or all
     #[arg(long, value_name = "NAME,…", num_args = 0..=1, require_equals = true, default_missing_value = ALL, help_heading = "Rights")]
     allow_env: Vec<String>,
-    /// Let the program use these serial ports, or all
+    /// Permit access to these serial lines, or all
     #[arg(long, value_name = "PATH,…", num_args = 0..=1, require_equals = true, default_missing_value = ALL, help_heading = "Rights")]
     allow_serial: Vec<String>,
-    /// Let the program do everything that the system lets its user do
+    /// Permit everything that the system permits its user
     #[arg(long, help_heading = "Rights")]
     allow_all: bool,
     /// Read more of these flags from a file, one a line

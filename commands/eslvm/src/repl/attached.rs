@@ -30,7 +30,7 @@ const HEARING: Duration = Duration::from_secs(1);
 /// The commands.
 const COMMANDS: &[SessionCommand] = &[
     row(&[":tasks"], "", "the tasks of the run, as a tree, with their numbers"),
-    row(&[":bt"], "[N]", "the backtrace of the newest failure, or what task N does and where"),
+    row(&[":bt"], "[N]", "the backtrace of the newest failure, or the activity and the frames of task N"),
     row(&[":failures"], "", "the latest failures of the run"),
     row(&[":facts"], "[NAME [N]]", "facts of the database, 500 at a time, after the first N"),
     row(&[":data"], "", "relations, locks of properties, and inputs"),

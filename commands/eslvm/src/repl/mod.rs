@@ -60,12 +60,12 @@ const COMMANDS: &[SessionCommand] = &[
     SessionCommand {
         names: &[":bt"],
         arguments: "[full]",
-        does: "shows the newest failure: what it was, and the frames with their variables, or all of the library",
+        does: "shows the newest failure, and its frames with their variables, or also those of the library",
     },
     SessionCommand {
         names: &[":tasks"],
         arguments: "",
-        does: "shows the tasks, who made them, and what they wait for",
+        does: "shows the tasks, their makers and what they wait for",
     },
     SessionCommand { names: &[":abort"], arguments: "N", does: "aborts the task with the number N" },
     SessionCommand {

@@ -19,10 +19,10 @@ pub struct ReplayOptions {
     /// Stop at a place of the run: tick:N, turn:N, time:SECONDS or failure
     #[arg(long, value_name = "PLACE", value_parser = Target::from_str)]
     until: Option<Target>,
-    /// Stop at what happens: failure, failure:CAUSE, task:NAME, fact:PATTERN or function:NAME
+    /// Stop at an event: failure, failure:CAUSE, task:NAME, fact:PATTERN or function:NAME
     #[arg(long = "break", value_name = "WHAT", value_parser = Breakpoint::from_str)]
     breakpoints: Vec<Breakpoint>,
-    /// Print nothing of the program; say whether the replay is the recorded run
+    /// Print no output of the program; report whether the replay equals the recorded run
     #[arg(long, conflicts_with_all = ["until", "breakpoints"])]
     check: bool,
     /// Write a timeline of the replay to a file: a drawing if its name ends in `.svg`, else a trace for

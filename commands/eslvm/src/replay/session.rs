@@ -27,7 +27,7 @@ const COMMANDS: &[SessionCommand] = &[
     row(&["tasks"], "", "shows the tasks, and what they wait for"),
     row(&["bt"], "[TASK]", "shows the frames of a task, by its name or number"),
     row(&["facts"], "QUERY", "shows the answers to a query: facts (door ?name open)"),
-    row(&["print", "p"], "FORM", "shows the values of a form; nothing is changed by it"),
+    row(&["print", "p"], "FORM", "shows the values of a form, evaluated in a copy"),
     row(&["help"], "", "shows this list"),
     row(&["quit", "q", "exit"], "", "ends, as Ctrl-D does"),
 ];

@@ -53,17 +53,17 @@ pub(crate) enum EslvmAction {
         options: MachineOptions,
         #[command(flatten)]
         compiling: CompilingOptions,
-        /// Seconds of the program's clock in a second of real time:
-        /// for a program whose outside is a simulator
+        /// Seconds of the program's clock in a second of real time,
+        /// for a program connected to a simulator
         #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_speed)]
         speed: f64,
         /// Print figures of the run to standard error at its end; with `=tasks` or `=functions`, also of
         /// those with most ticks; with `=coverage`, also what was not run
         #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
         stats: Option<Stats>,
-        /// How functions run, which no program can tell: by the interpreter, all as machine code, or as
-        /// machine code those that are hot, which is the default. A build without the cargo feature `native`
-        /// says that the option has no effect, and interprets all
+        /// Execution of functions, which changes nothing in the run: by the interpreter, all as machine code,
+        /// or hot ones as machine code, the default. A build without the cargo feature `native` interprets
+        /// all, and reports that the option has no effect
         #[arg(long, value_enum, value_name = "TIER", conflicts_with = "schedule")]
         tier: Option<TierChoice>,
         /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
@@ -76,15 +76,15 @@ pub(crate) enum EslvmAction {
         /// Record the run in a file, for `eslvm replay`: the program, and everything that reaches it
         #[arg(long, value_name = "FILE")]
         record: Option<PathBuf>,
-        /// Write to a file which tasks, calls and lines have used the ticks and the time: a flame graph if
-        /// its name ends in `.svg`, for speedscope if it ends in `.json`, else a line for each stack
+        /// Write a profile of ticks and time by task, call and line to a file: a flame graph if its name ends
+        /// in `.svg`, for speedscope if it ends in `.json`, else a line for each stack
         #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
         profile: Option<PathBuf>,
         /// Unit of a flame graph and of lines of stacks; data for speedscope have both units
         #[arg(long, value_enum, default_value_t = ProfileUnit::Ticks, value_name = "UNIT")]
         #[arg(requires = "profile")]
         profile_unit: ProfileUnit,
-        /// Write to a file, in the form of lcov, how often each line, function and arm was run
+        /// Write the coverage of lines, functions and arms to a file, in the format of lcov
         #[arg(long, value_name = "FILE", conflicts_with_all = ["schedule", "record"])]
         coverage: Option<PathBuf>,
         /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
@@ -101,7 +101,7 @@ pub(crate) enum EslvmAction {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARG")]
         arguments: Vec<String>,
     },
-    /// Run a recorded run again, forwards and backwards
+    /// Replay a recorded run, forwards and backwards
     ///
     /// Needs neither the sources nor the world of the program, and waits for nothing. With --until or
     /// --break the replay stops there and takes commands from standard input: `help` lists them. Exit
@@ -133,8 +133,8 @@ pub(crate) enum EslvmAction {
         /// Write a report in the form of JUnit to a file
         #[arg(long, value_name = "FILE")]
         junit: Option<PathBuf>,
-        /// Write to a file, in the form of lcov, how often each line, function and arm was run, and print
-        /// what was not
+        /// Write the coverage of lines, functions and arms to a file, in the format of lcov, and print
+        /// those that were not run
         #[arg(long, value_name = "FILE")]
         coverage: Option<PathBuf>,
         /// Most ticks of a run of a test
@@ -180,7 +180,7 @@ pub(crate) enum EslvmAction {
         /// Speak TLS, as a run does that was begun with --certificate
         #[arg(long)]
         tls: bool,
-        /// The same, with a run whose certificate is in this file, in PEM, or signed by one of it
+        /// Speak TLS with a run whose certificate is in this file, in PEM, or signed by one in it
         #[arg(long, value_name = "FILE")]
         ca_file: Option<PathBuf>,
         #[command(flatten)]
