@@ -142,8 +142,8 @@ impl Host for Asked {
 
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
         let wake = self.host.wait(deadline, awaited);
-        // The run has not asked for looks at it; it will wait on.
-        if wake != Wake::Look {
+        // Inspections are not part of the run, which waits on.
+        if wake != Wake::Inspection {
             self.note_word(AskedQuestion::Wait, deadline.unwrap_or(u64::MAX));
         }
         wake

@@ -137,7 +137,7 @@ pub enum Wake {
     /// Something has come into the inbox, or standard input has data.
     Arrival,
     /// A survey is requested, and nothing else has arrived: the machine answers, and waits on.
-    Look,
+    Inspection,
     /// Nothing can ever arrive: there is no deadline, no input, and no sender.
     Never,
 }

@@ -15,8 +15,8 @@ use std::time::{Duration, Instant};
 use esl_bytecode::datum::Datum;
 
 use super::door::Doors;
-use super::look::Looks;
 use super::question::{Asking, Question};
+use super::survey::Inspections;
 use super::{News, ProcessSignal, Wake};
 
 /// Something that reaches a run from outside.
@@ -81,8 +81,8 @@ struct InboxState {
     /// notification without waiters takes a call of the system too, and most messages come while the machine
     /// runs.
     waiting: AtomicU32,
-    /// Looks, which come beside the contents.
-    looks: Mutex<Looks>,
+    /// Inspections, which come beside the contents.
+    inspections: Mutex<Inspections>,
     doors: Doors,
     asking: Asking,
     /// A bit for each signal of the process that the program handles, by number.
@@ -106,9 +106,9 @@ impl Inbox {
         self.0.contents.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn looks(&self) -> MutexGuard<'_, Looks> {
+    pub(super) fn inspections(&self) -> MutexGuard<'_, Inspections> {
         // The list is whole at every moment, so a panic elsewhere does not corrupt it.
-        self.0.looks.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.inspections.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn doors(&self) -> &Doors {
@@ -188,10 +188,14 @@ impl Inbox {
     /// Returns why the inbox is rung, for a host whose wait that ends.
     pub fn why_rung(&self) -> Wake {
         let contents = self.contents();
-        if contents.is_empty() && !self.looks().list.is_empty() { Wake::Look } else { Wake::Arrival }
+        if contents.is_empty() && !self.inspections().list.is_empty() {
+            Wake::Inspection
+        } else {
+            Wake::Arrival
+        }
     }
 
-    /// Ends the ringing if nothing is there but looks, which are about to be taken.
+    /// Ends the ringing if nothing is there but inspections, which are about to be taken.
     #[doc(hidden)]
     pub fn quieten(&self) {
         let contents = self.contents();

@@ -12,7 +12,7 @@
 //! | `door` | [`Sender`]: signals of inputs, with a limit on the unread ones |
 //! | `operation` | [`HostOperation`]: work of the outside for a task, and its end |
 //! | `question` | [`Question`]: calls, evaluations and commands for a run, and their answers |
-//! | `look` | [`Look`]: reading the state of a run between two turns, without an effect on it |
+//! | `survey` | [`Inspection`]: reading the state of a run between two turns, without an effect on it |
 //! | `task_tree` | the tree of the tasks in what was seen |
 //! | `rights` | [`Rights`]: access that is granted to a program |
 //! | `console` | the standard streams, buffered between a program and its host |
@@ -40,7 +40,6 @@ mod function;
 mod host;
 mod inbox;
 mod input;
-mod look;
 mod operation;
 mod question;
 mod real;
@@ -51,6 +50,7 @@ mod replay;
 mod rights;
 mod shared;
 mod signal;
+mod survey;
 mod task_tree;
 mod value;
 mod virtual_host;
@@ -67,10 +67,6 @@ pub use host::{
 };
 pub use inbox::{Inbox, Incoming};
 pub use input::HostInput;
-pub use look::{
-    FailureFrame, FailureRow, FrameRow, FrameVariable, InputRow, Lateness, LockRow, Look, RelationRow,
-    RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
-};
 pub use operation::{HostFailure, HostOperation, News};
 pub use question::{Answer, FunctionRef, Kept, Pending, Question, TaskInfo};
 pub use real::{RealHost, Screen, request_of_files};
@@ -78,6 +74,10 @@ pub use record::{NotedRecord, QuestionHash, Record, Recorder, Recording, Recordi
 pub use replay::{Divergence, ReplayHost};
 pub use rights::{Permit, Right, Rights};
 pub use signal::ProcessSignal;
+pub use survey::{
+    FailureFrame, FailureRow, FrameRow, FrameVariable, InputRow, Inspection, Lateness, LockRow, RelationRow,
+    RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
+};
 pub use value::{HostHandle, HostObject, IntoDatum, IntoValues, Keyword, Values};
 pub use virtual_host::{Captured, VirtualHost};
 

@@ -272,7 +272,7 @@ impl<H: Host, R: Recorder> Host for RecordingHost<H, R> {
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
         self.recorder.flush();
         let wake = self.host.wait(deadline, awaited);
-        if wake == Wake::Look {
+        if wake == Wake::Inspection {
             return wake;
         }
         self.note(QuestionHash::of_wait(deadline, awaited), Waited(wake)).0

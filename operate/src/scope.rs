@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use esl_host::{Inbox, Look, Sender, Survey, SurveyRequest};
+use esl_host::{Inbox, Inspection, Sender, Survey, SurveyRequest};
 use esl_vm::vm::Vm;
 use tokio::sync::oneshot;
 
@@ -37,7 +37,7 @@ impl RunScope {
     pub(super) async fn survey(&self, request: SurveyRequest) -> Option<Survey> {
         let (tell, told) = oneshot::channel();
         // The receiver may be gone.
-        self.inbox.look(Look::Survey(request, Box::new(move |survey| drop(tell.send(survey)))));
+        self.inbox.inspect(Inspection::Survey(request, Box::new(move |survey| drop(tell.send(survey)))));
         tokio::time::timeout(PATIENCE, told).await.ok()?.ok()
     }
 }

@@ -68,7 +68,7 @@ packed_as! {
     // Surveys are not recorded.
     Wake: |wake, out| out.byte(match wake {
             Wake::Time => 0,
-            Wake::Arrival | Wake::Look => 1,
+            Wake::Arrival | Wake::Inspection => 1,
             Wake::Never => 2,
         }),
         |from| Some(match from.byte()? {

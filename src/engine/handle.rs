@@ -8,7 +8,7 @@ use std::task::{Context, Poll};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_host::{
-    Answer, FunctionRef, Incoming, Look, Pending, ProcessSignal, Question, SendError, Sender, TaskInfo,
+    Answer, FunctionRef, Incoming, Inspection, Pending, ProcessSignal, Question, SendError, Sender, TaskInfo,
 };
 use esl_vm::embed::ExportError;
 use esl_vm::observe::{Coming, Observer};
@@ -152,7 +152,7 @@ impl Handle {
     /// Has an observer watch the run from the next turn on.
     pub fn subscribe(&self, observer: impl Observer + 'static) {
         self.coming.add(Box::new(observer));
-        self.sender.inbox().look(Look::Watch);
+        self.sender.inbox().inspect(Inspection::Watch);
     }
 
     fn ask<T: FromData>(

@@ -344,7 +344,7 @@ pub fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended {
 mod tests {
     use std::sync::{Arc, Mutex};
 
-    use esl_host::{Inbox, Look, Survey, SurveyRequest, VirtualHost};
+    use esl_host::{Inbox, Inspection, Survey, SurveyRequest, VirtualHost};
     use esl_vm::observe::{Observer, Seen};
     use esl_vm::task::TaskNumber;
 
@@ -418,7 +418,7 @@ mod tests {
             };
             let seen = self.seen.clone();
             let tell = Box::new(move |survey| seen.lock().expect("nobody panics").push(survey));
-            self.inbox.look(Look::Survey(request, tell));
+            self.inbox.inspect(Inspection::Survey(request, tell));
         }
     }
 
@@ -442,7 +442,7 @@ mod tests {
                 machine.gather_figures(true);
                 let onlooker = Onlooker { inbox: machine.inbox(), seen: Arc::clone(&seen), looks: 0 };
                 machine.coming_observers().add(Box::new(onlooker));
-                machine.inbox().look(Look::Watch);
+                machine.inbox().inspect(Inspection::Watch);
             }
             let summary = run_in(&mut machine, &program).expect("it runs");
             assert_eq!(summary.ended, Ended::Normally(0), "{}", captured.error());

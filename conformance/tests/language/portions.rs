@@ -148,7 +148,7 @@ fn addresses_change_nothing() {
 /// Surveys, as the monitor and the metrics use them, change nothing in a run.
 #[test]
 fn looking_changes_nothing() {
-    use esl::host::{Look, SurveyRequest};
+    use esl::host::{Inspection, SurveyRequest};
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};
     for text in PROGRAMS {
@@ -173,7 +173,7 @@ fn looking_changes_nothing() {
                         ..SurveyRequest::default()
                     };
                     let tell = move |_| _ = told.fetch_add(1, Ordering::Relaxed);
-                    machine.inbox().look(Look::Survey(request, Box::new(tell)));
+                    machine.inbox().inspect(Inspection::Survey(request, Box::new(tell)));
                 }
                 if machine.run(portion) != RunOutcome::TicksUsed {
                     break;

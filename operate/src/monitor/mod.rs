@@ -8,7 +8,7 @@
 //! not read its events is disconnected.
 
 mod model;
-mod wish;
+mod request;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::TcpListener;
@@ -33,7 +33,7 @@ use super::refusal::OperatorRefusal;
 use super::scope::RunScope;
 use super::secrets::{OperatorRole, Secrets};
 use model::{RunModel, ViewerView};
-use wish::{Admitted, MonitorDeed, Wish, admit, wish};
+use request::{Admitted, MonitorCommand, MonitorRequest, admit, parse};
 
 /// The page; `NONCE` stands for what its script and its style are marked with.
 const PAGE: &str = include_str!("page.html");
@@ -169,12 +169,12 @@ async fn answer(
     let Ok(Ok(body)) = body else {
         return plain(StatusCode::PAYLOAD_TOO_LARGE, "the request is too large, or comes too slowly\n");
     };
-    match wish(role, is_view, &body.to_bytes()) {
+    match parse(role, is_view, &body.to_bytes()) {
         Err((status, text)) => plain(status, text),
-        Ok(Wish::View { viewer, view }) => set_view(&monitor, &viewer, view),
-        Ok(Wish::Deed(deed)) => {
-            let done = match deed {
-                Ok(deed) => act(&monitor, deed).await,
+        Ok(MonitorRequest::View { viewer, view }) => set_view(&monitor, &viewer, view),
+        Ok(MonitorRequest::Command(command)) => {
+            let done = match command {
+                Ok(command) => act(&monitor, command).await,
                 Err(reason) => Err(reason),
             };
             let (status, text) = match done {
@@ -190,7 +190,7 @@ async fn answer(
 /// Returns the number of requests that were understood.
 pub(super) fn understand(secrets: &Secrets, bytes: &[u8]) -> usize {
     http::understand(bytes, |head, body| match admit(secrets, "http://", head) {
-        Ok(Admitted::Post { role, is_view }) => wish(role, is_view, body).is_ok(),
+        Ok(Admitted::Post { role, is_view }) => parse(role, is_view, body).is_ok(),
         admitted => admitted.is_ok(),
     })
 }
@@ -346,16 +346,16 @@ fn set_view(monitor: &MonitorState, viewer: &str, wanted: ViewerView) -> Respons
 ///
 /// # Errors
 /// Why it was not done.
-async fn act(monitor: &MonitorState, deed: MonitorDeed) -> Result<(), OperatorRefusal> {
+async fn act(monitor: &MonitorState, command: MonitorCommand) -> Result<(), OperatorRefusal> {
     let sender = monitor.scope.sender();
-    match deed {
-        MonitorDeed::Abort(task) => sender.inbox().put(Incoming::Abort(task)),
-        MonitorDeed::Pause(pauses) => sender.inbox().put(Incoming::Pause(pauses)),
-        MonitorDeed::Suspend(task, suspends) => {
+    match command {
+        MonitorCommand::Abort(task) => sender.inbox().put(Incoming::Abort(task)),
+        MonitorCommand::Pause(pauses) => sender.inbox().put(Incoming::Pause(pauses)),
+        MonitorCommand::Suspend(task, suspends) => {
             let number = i64::try_from(task).unwrap_or(i64::MAX);
             call(&sender, "%SESSION-SUSPEND", vec![integer(number), boolean(suspends)]).await?;
         }
-        MonitorDeed::Signal(name, data) => {
+        MonitorCommand::Signal(name, data) => {
             call(&sender, "%SESSION-SIGNAL", vec![string(&name), data]).await?;
         }
     }

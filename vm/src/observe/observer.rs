@@ -91,7 +91,7 @@ impl Coming {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds an observer. The machine learns of it by [`Look::Watch`](esl_host::Look::Watch).
+    /// Adds an observer. The machine learns of it by [`Inspection::Watch`](esl_host::Inspection::Watch).
     pub fn add(&self, observer: Box<dyn Observer>) {
         self.list().push(observer);
     }

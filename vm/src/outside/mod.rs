@@ -171,6 +171,6 @@ impl Drop for Outside {
     fn drop(&mut self) {
         self.inbox.close_doors();
         self.inbox.end_answers();
-        self.inbox.end_looks();
+        self.inbox.end_inspections();
     }
 }

@@ -1,7 +1,7 @@
 //! Taking in what has come into the machine's inbox, between two turns.
 
 use esl_bytecode::datum::Datum;
-use esl_host::{Awaited, Host, Incoming, Look, ProcessSignal, Question, Wake};
+use esl_host::{Awaited, Host, Incoming, Inspection, ProcessSignal, Question, Wake};
 
 use super::finish::allocate_without_retry;
 use super::news::{hear, import_list};
@@ -26,7 +26,7 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
             stops |= take_in_one(vm, incoming);
         }
     }
-    serve_looks(vm);
+    serve_inspections(vm);
     stops
 }
 
@@ -88,20 +88,20 @@ fn take_in_one(vm: &mut Vm, incoming: Incoming) -> bool {
 pub(crate) fn wait_in_host(vm: &mut Vm, deadline: Option<u64>, awaited: Awaited) -> Wake {
     loop {
         let wake = vm.outside.host.wait(deadline, awaited);
-        if wake != Wake::Look {
+        if wake != Wake::Inspection {
             return wake;
         }
         vm.outside.inbox.quieten();
-        serve_looks(vm);
+        serve_inspections(vm);
     }
 }
 
 /// Answers surveys of the run, which change nothing in it.
-pub(super) fn serve_looks(vm: &mut Vm) {
-    for look in vm.outside.inbox.take_looks() {
-        match look {
-            Look::Survey(request, tell) => tell(vm.survey(&request)),
-            Look::Watch => admit_observers(vm),
+pub(super) fn serve_inspections(vm: &mut Vm) {
+    for inspection in vm.outside.inbox.take_inspections() {
+        match inspection {
+            Inspection::Survey(request, tell) => tell(vm.survey(&request)),
+            Inspection::Watch => admit_observers(vm),
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use esl_host::{Awaited, Host, Wake};
 
-use super::arrival::{serve_looks, wait_in_host, wake_readers};
+use super::arrival::{serve_inspections, wait_in_host, wake_readers};
 use super::limit::expire_in_time;
 use super::news::{expects_news, say_what_operators_can_do};
 use super::tell_how_far;
@@ -100,11 +100,11 @@ pub(super) fn go_on_in_time(vm: &mut Vm) -> bool {
     let first = vm.scheduler.first_timer();
     let is_virtual = vm.scheduler.clock.is_virtual;
     if vm.outside.inbox.is_rung() {
-        if vm.outside.inbox.why_rung() != Wake::Look {
+        if vm.outside.inbox.why_rung() != Wake::Inspection {
             return true;
         }
         vm.outside.inbox.quieten();
-        serve_looks(vm);
+        serve_inspections(vm);
     }
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
     if input || is_virtual && first.is_some() {

@@ -20,7 +20,7 @@ pub(super) unsafe extern "C" fn value_of_key(
     unsafe {
         let (vm, _) = parts(context);
         let (key, table) = (Value::from_bits(key), Value::from_bits(table));
-        end_lookup(context, at_once(vm, LookupDeed::Get, key, table, Value::from_bits(default)))
+        end_lookup(context, at_once(vm, LookupOperation::Get, key, table, Value::from_bits(default)))
     }
 }
 
@@ -36,7 +36,7 @@ pub(super) unsafe extern "C" fn set_value_of_key(
     unsafe {
         let (vm, _) = parts(context);
         let (key, table) = (Value::from_bits(key), Value::from_bits(table));
-        end_lookup(context, at_once(vm, LookupDeed::Set, key, table, Value::from_bits(value)))
+        end_lookup(context, at_once(vm, LookupOperation::Set, key, table, Value::from_bits(value)))
     }
 }
 
@@ -52,7 +52,7 @@ pub(super) unsafe extern "C" fn add_to_value_of_key(
     unsafe {
         let (vm, _) = parts(context);
         let (key, table) = (Value::from_bits(key), Value::from_bits(table));
-        end_lookup(context, at_once(vm, LookupDeed::Add, key, table, Value::from_bits(delta)))
+        end_lookup(context, at_once(vm, LookupOperation::Add, key, table, Value::from_bits(delta)))
     }
 }
 
@@ -75,7 +75,7 @@ unsafe fn end_lookup(context: *mut NativeContext, found: Option<Value>) -> u64 {
 
 /// The operation on a key.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum LookupDeed {
+enum LookupOperation {
     /// A `gethash` that wants one value, given the default.
     Get,
     /// A `%puthash` of a key that is there, given the value.
@@ -86,45 +86,51 @@ enum LookupDeed {
 
 /// Does something with a key; `None`, without effect, if that takes more than a search.
 #[inline(always)]
-fn at_once(vm: &mut Vm, deed: LookupDeed, key: Value, table: Value, given: Value) -> Option<Value> {
+fn at_once(vm: &mut Vm, operation: LookupOperation, key: Value, table: Value, given: Value) -> Option<Value> {
     let table = Table::of(&vm.heap, table)?;
     match key.as_fixnum() {
         Some(n) => {
             let found = vm.exchange.lookups.locate_fixnum(&vm.heap, table, key, n).ok()?;
-            act(vm, deed, key, table, &found, given)
+            act(vm, operation, key, table, &found, given)
         }
-        None => with_other_key(vm, deed, key, table, given),
+        None => with_other_key(vm, operation, key, table, given),
     }
 }
 
 /// As [`at_once`], for keys of any kind: so the way of fixnums needs no memory.
 #[inline(never)]
-fn with_other_key(vm: &mut Vm, deed: LookupDeed, key: Value, table: Table, given: Value) -> Option<Value> {
+fn with_other_key(
+    vm: &mut Vm,
+    operation: LookupOperation,
+    key: Value,
+    table: Table,
+    given: Value,
+) -> Option<Value> {
     let found = vm.exchange.lookups.locate_other(&vm.heap, table, key).ok()?;
-    act(vm, deed, key, table, &found, given)
+    act(vm, operation, key, table, &found, given)
 }
 
 /// Does something with a key that was searched.
 #[inline(always)]
 fn act(
     vm: &mut Vm,
-    deed: LookupDeed,
+    operation: LookupOperation,
     key: Value,
     table: Table,
     found: &Lookup,
     given: Value,
 ) -> Option<Value> {
-    let value = match (deed, &found.place) {
-        (LookupDeed::Get, &KeyPlace::Entry(_, value)) => value,
-        (LookupDeed::Get, KeyPlace::None(_)) | (LookupDeed::Set, KeyPlace::Entry(..)) => given,
-        (LookupDeed::Add, KeyPlace::Entry(_, value)) => {
+    let value = match (operation, &found.place) {
+        (LookupOperation::Get, &KeyPlace::Entry(_, value)) => value,
+        (LookupOperation::Get, KeyPlace::None(_)) | (LookupOperation::Set, KeyPlace::Entry(..)) => given,
+        (LookupOperation::Add, KeyPlace::Entry(_, value)) => {
             Value::fixnum(value.as_fixnum()?.checked_add(given.as_fixnum()?)?)?
         }
-        (LookupDeed::Set | LookupDeed::Add, KeyPlace::None(_)) => return None,
+        (LookupOperation::Set | LookupOperation::Add, KeyPlace::None(_)) => return None,
     };
     vm.exchange.note_lookup(&vm.heap, table, key, found);
     if let KeyPlace::Entry(entry, _) = found.place
-        && deed != LookupDeed::Get
+        && operation != LookupOperation::Get
     {
         table.set_value(&mut vm.heap, entry, value);
     }

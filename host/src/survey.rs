@@ -1,8 +1,8 @@
-//! Looks: requests from outside to inspect a run, without side effects.
+//! Inspections: requests from outside to inspect a run, without side effects.
 //!
-//! A look comes to the machine beside the contents of the inbox, and is answered between two turns, also
-//! while the machine sleeps in its host. It belongs to no round, is in no recording and wakes no task, so a
-//! run that is looked at is the run that it would have been. Everything here is plain data.
+//! An inspection comes to the machine beside the contents of the inbox, and is answered between two turns,
+//! also while the machine sleeps in its host. It belongs to no round, is in no recording and wakes no task,
+//! so a run that is looked at is the run that it would have been. Everything here is plain data.
 
 use std::fmt;
 
@@ -275,54 +275,54 @@ pub struct Survey {
 }
 
 /// A survey to be made, or observers to be registered.
-pub enum Look {
+pub enum Inspection {
     /// A survey, and the callback that receives it. It is dropped if the machine is gone.
     Survey(SurveyRequest, Box<dyn FnOnce(Survey) + Send>),
     /// Observers have arrived, which are to be registered.
     Watch,
 }
 
-impl fmt::Debug for Look {
+impl fmt::Debug for Inspection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Look::Survey(request, _) => write!(f, "Survey({request:?})"),
-            Look::Watch => f.write_str("Watch"),
+            Inspection::Survey(request, _) => write!(f, "Survey({request:?})"),
+            Inspection::Watch => f.write_str("Watch"),
         }
     }
 }
 
-/// The looks that the machine has not taken yet.
+/// The inspections that the machine has not taken yet.
 #[derive(Debug, Default)]
-pub(super) struct Looks {
-    pub(super) list: Vec<Look>,
+pub(super) struct Inspections {
+    pub(super) list: Vec<Inspection>,
     pub(super) is_closed: bool,
 }
 
 impl Inbox {
-    /// Has the machine look, from any thread, without any effect on the run.
-    pub fn look(&self, look: Look) {
+    /// Requests an inspection, from any thread, without any effect on the run.
+    pub fn inspect(&self, inspection: Inspection) {
         {
-            let mut looks = self.looks();
-            if looks.is_closed {
+            let mut inspections = self.inspections();
+            if inspections.is_closed {
                 return;
             }
-            looks.list.push(look);
+            inspections.list.push(inspection);
         }
         self.ring();
     }
 
-    /// Takes the looks.
+    /// Takes the requested inspections.
     #[doc(hidden)]
-    pub fn take_looks(&self) -> Vec<Look> {
-        std::mem::take(&mut self.looks().list)
+    pub fn take_inspections(&self) -> Vec<Inspection> {
+        std::mem::take(&mut self.inspections().list)
     }
 
     /// Says that the machine is gone.
     #[doc(hidden)]
-    pub fn end_looks(&self) {
-        let mut looks = self.looks();
-        looks.is_closed = true;
-        looks.list.clear();
+    pub fn end_inspections(&self) {
+        let mut inspections = self.inspections();
+        inspections.is_closed = true;
+        inspections.list.clear();
     }
 }
 
@@ -334,16 +334,16 @@ mod tests {
     #[test]
     fn a_look_is_told_from_an_arrival() {
         let inbox = Inbox::new();
-        inbox.look(Look::Watch);
-        assert!(inbox.is_rung() && inbox.why_rung() == Wake::Look);
+        inbox.inspect(Inspection::Watch);
+        assert!(inbox.is_rung() && inbox.why_rung() == Wake::Inspection);
         inbox.put(Incoming::Stop);
         assert_eq!(inbox.why_rung(), Wake::Arrival);
         inbox.quieten();
         assert!(inbox.is_rung(), "the arrival is still there");
         inbox.take();
-        assert!(!inbox.is_rung() && inbox.take_looks().len() == 1);
-        inbox.end_looks();
-        inbox.look(Look::Watch);
-        assert!(!inbox.is_rung() && inbox.take_looks().is_empty());
+        assert!(!inbox.is_rung() && inbox.take_inspections().len() == 1);
+        inbox.end_inspections();
+        inbox.inspect(Inspection::Watch);
+        assert!(!inbox.is_rung() && inbox.take_inspections().is_empty());
     }
 }

@@ -26,7 +26,7 @@ pub(super) enum Admitted {
 pub(super) type Refusal = (StatusCode, &'static str);
 
 /// Something that is to be done in the run.
-pub(super) enum MonitorDeed {
+pub(super) enum MonitorCommand {
     /// A task is to be aborted.
     Abort(u64),
     /// The run is to be paused, or to go on.
@@ -38,11 +38,11 @@ pub(super) enum MonitorDeed {
 }
 
 /// The request in a body.
-pub(super) enum Wish {
+pub(super) enum MonitorRequest {
     /// That this viewer sees something else.
     View { viewer: String, view: ViewerView },
     /// That something is done; why it cannot be.
-    Deed(Result<MonitorDeed, OperatorRefusal>),
+    Command(Result<MonitorCommand, OperatorRefusal>),
 }
 
 /// Parses and authorizes the head of a request.
@@ -104,7 +104,7 @@ fn parameter<'a>(query: &'a str, name: &str) -> &'a str {
 ///
 /// # Errors
 /// Why it is turned away.
-pub(super) fn wish(role: OperatorRole, is_view: bool, body: &[u8]) -> Result<Wish, Refusal> {
+pub(super) fn parse(role: OperatorRole, is_view: bool, body: &[u8]) -> Result<MonitorRequest, Refusal> {
     let value: Value =
         serde_json::from_slice(body).map_err(|_| (StatusCode::BAD_REQUEST, "the request is not JSON\n"))?;
     if is_view {
@@ -121,29 +121,29 @@ pub(super) fn wish(role: OperatorRole, is_view: bool, body: &[u8]) -> Result<Wis
             facts_from: number("facts_from"),
             ..ViewerView::default()
         };
-        return Ok(Wish::View { viewer: text("viewer"), view });
+        return Ok(MonitorRequest::View { viewer: text("viewer"), view });
     }
     if role < OperatorRole::Command {
         return Err((StatusCode::FORBIDDEN, "this token permits surveys only\n"));
     }
-    Ok(Wish::Deed(deed(&value)))
+    Ok(MonitorRequest::Command(command(&value)))
 }
 
 /// Returns what is to be done.
 ///
 /// # Errors
 /// Why it cannot be.
-fn deed(value: &Value) -> Result<MonitorDeed, OperatorRefusal> {
+fn command(value: &Value) -> Result<MonitorCommand, OperatorRefusal> {
     let task = || value["task"].as_u64().filter(|&n| n > 0).ok_or(OperatorRefusal::NoNumber);
     Ok(match value["action"].as_str().unwrap_or_default() {
-        "abort" => MonitorDeed::Abort(task()?),
-        "pause" => MonitorDeed::Pause(true),
-        "continue" => MonitorDeed::Pause(false),
-        "suspend" => MonitorDeed::Suspend(task()?, true),
-        "resume" => MonitorDeed::Suspend(task()?, false),
+        "abort" => MonitorCommand::Abort(task()?),
+        "pause" => MonitorCommand::Pause(true),
+        "continue" => MonitorCommand::Pause(false),
+        "suspend" => MonitorCommand::Suspend(task()?, true),
+        "resume" => MonitorCommand::Suspend(task()?, false),
         "signal" => {
             let name = value["input"].as_str().unwrap_or_default().to_uppercase();
-            MonitorDeed::Signal(name, codes_of(value["data"].as_str().unwrap_or_default())?)
+            MonitorCommand::Signal(name, codes_of(value["data"].as_str().unwrap_or_default())?)
         }
         _ => return Err(OperatorRefusal::UnknownAction),
     })
@@ -188,9 +188,11 @@ mod tests {
                     }
                     let (head, ()) = request.body(()).expect("it is a request").into_parts();
                     let status = match admit(&secrets, "http://", &head) {
-                        Ok(Admitted::Post { role, is_view }) => match wish(role, is_view, body) {
-                            Ok(Wish::Deed(deed)) => if deed.is_ok() { "done" } else { "not" }.to_string(),
-                            Ok(Wish::View { .. }) => "seen".into(),
+                        Ok(Admitted::Post { role, is_view }) => match parse(role, is_view, body) {
+                            Ok(MonitorRequest::Command(command)) => {
+                                if command.is_ok() { "done" } else { "not" }.to_string()
+                            }
+                            Ok(MonitorRequest::View { .. }) => "seen".into(),
                             Err((status, _)) => status.as_u16().to_string(),
                         },
                         Ok(_) => "seen".into(),
