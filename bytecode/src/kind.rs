@@ -2,9 +2,9 @@
 //! refuses.
 //!
 //! The names of parameters in [`crate::builtin`] are words for kinds: a parameter called `number` takes a
-//! number. So the compiler can tell from the table that `(+ 1 "2")` fails. A kind refuses a constant only
-//! if every builtin with such a parameter does; `conformance/tests/language/constants.rs` calls each of them with
-//! each refused constant.
+//! number. So the compiler can tell from the table that `(+ 1 "2")` fails. A kind refuses a constant only if
+//! every builtin with such a parameter does; `conformance/tests/language/constants.rs` calls each of them
+//! with each refused constant.
 
 use crate::datum::DatumKind;
 

@@ -1,8 +1,8 @@
 //! Runs every program of `programs/` and compares the result with the expectations in its comments.
 //!
-//! Each program is one test. It is compiled once, then runs from the compiled module and from the bytes of the
-//! corresponding file: with the feature `thorough` under every setting that it does not exclude, otherwise under
-//! the first of them.
+//! Each program is one test. It is compiled once, then runs from the compiled module and from the bytes of
+//! the corresponding file: with the feature `thorough` under every setting that it does not exclude,
+//! otherwise under the first of them.
 #![allow(clippy::print_stderr, reason = "a test runner prints its results")]
 
 use std::path::Path;

@@ -37,7 +37,7 @@ impl fmt::Display for SendError {
 
 impl std::error::Error for SendError {}
 
-/// What is known of one input.
+/// The state of one input, as senders see it.
 #[derive(Debug, Default)]
 struct Door {
     /// Number of signals for which there is room, if senders wait.
@@ -102,7 +102,7 @@ impl Doors {
         });
     }
 
-    /// Changes the table, and has everybody look who waits for room.
+    /// Changes the table, and wakes all senders that wait for room.
     fn change_table(&self, change: impl FnOnce(&mut DoorTable)) {
         let wakers = {
             let mut table = self.state();
@@ -185,7 +185,7 @@ impl Drop for Membership {
     }
 }
 
-/// Somebody outside who may signal the inputs of a machine. While there is one, a program that waits is not
+/// A handle outside that may signal the inputs of a machine. While one exists, a waiting program is not
 /// deadlocked.
 ///
 /// Clones are the same sender. What is sent comes into the inbox in the order of sending.

@@ -132,7 +132,7 @@ define_records! {
     Read(Input);
     /// Whether a person watches standard output.
     Interactive(bool);
-    /// What came of a request of files.
+    /// The answer to a request about files.
     Filed(Result<FileAnswer, HostError>);
     /// Whether a right is granted.
     Permitted(Permit);
@@ -142,7 +142,7 @@ define_records! {
     Exists(bool);
     /// Result of a function of the embedder's.
     Called(Result<Datum, HostFailure>);
-    /// Exit status of a program whose output nobody reads.
+    /// Exit status of a program whose output is closed.
     BrokenOutput(u8);
     /// How many questions before it were answered no, and the time, for a timer that is due.
     Due((u64, u64));
@@ -180,7 +180,7 @@ impl Record {
     }
 }
 
-/// Somebody who keeps records.
+/// A keeper of records.
 pub trait Recorder: Send {
     /// Is given the next record.
     fn note(&self, noted: NotedRecord);

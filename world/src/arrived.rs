@@ -1,11 +1,11 @@
-//! What has been read, until the program takes it.
+//! Input buffered for the program.
 
 use esl_bytecode::datum::Datum;
 
 use esl_bytecode::Bytes;
 use esl_host::IntoDatum;
 
-/// What has been read and the program has not taken.
+/// Input that the program has not taken yet.
 #[derive(Default)]
 pub(crate) struct Arrived {
     bytes: Vec<u8>,

@@ -1,4 +1,4 @@
-//! What ESL programs can do without Rust: modules over the operating system.
+//! The library of ESL programs over the operating system.
 //!
 //! Whatever the system may delay is an operation, done on one event loop in its own thread: only the task
 //! that has asked for it waits. The operations are the small part of a module that is in Rust; the rest is in

@@ -16,7 +16,7 @@ impl Cancelled {
     /// Waits until the operation is cancelled: for ever, if that does not happen.
     pub(crate) async fn wait(&mut self) {
         if (&mut self.0).await.is_err() {
-            // Nobody can cancel it any more.
+            // It cannot be cancelled any more.
             std::future::pending::<()>().await;
         }
     }
@@ -71,7 +71,7 @@ impl BegunOperation {
     }
 
     fn end(&mut self, answer: Completion) {
-        // What the future holds is let go before the program hears that it is over.
+        // The future is dropped before the program learns that it is over.
         self.future = None;
         match (self.operation.take(), answer) {
             (Some(operation), Ok(values)) => operation.complete(values),
@@ -125,7 +125,7 @@ impl Future for UnderWay {
                 self.begun.cancel();
                 return Poll::Ready(());
             }
-            // Nobody can cancel it any more.
+            // It cannot be cancelled any more.
             Some(Poll::Ready(Err(_))) => self.cancelled = None,
             _ => {}
         }

@@ -197,7 +197,7 @@ fn command(
 ) -> Result<Command, HostFailure> {
     let unknown = || process_failure(format!("there is no program `{name}`"));
     let mut command = Command::new(find_program(name).ok_or_else(unknown)?);
-    // What is in the arguments is the program's; only its own name tells it under which it was called.
+    // The program sees the name under which it was called as argument 0, not the path that was found.
     #[cfg(unix)]
     command.arg0(name);
     command.args(arguments).envs(environment);
@@ -265,7 +265,7 @@ async fn run(
     answer
 }
 
-/// Reads all that a program writes. `NIL` if nobody wants it.
+/// Reads all output of a program. `NIL` if its output is not captured.
 async fn text_from(pipe: Option<impl AsyncRead + Unpin>) -> Result<Datum, HostFailure> {
     let Some(pipe) = pipe else { return Ok(().into_datum()) };
     let mut bytes = Vec::new();
@@ -333,7 +333,7 @@ fn launch(
                 },
             }
         };
-        // Nobody may be left who wants to know.
+        // The receivers may be gone.
         _ = status_sender.send(Some(status.map_or(-1, status_number)));
     };
     event_loop::spawn(watch).map_err(process_failure)?;

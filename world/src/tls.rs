@@ -34,15 +34,15 @@ pub enum TlsError {
     Name(InvalidDnsNameError),
     /// TLS cannot be set up.
     Setup(rustls::Error),
-    /// The peer does not prove who it is, or the connection ends.
+    /// The peer does not prove its identity, or the connection ends.
     Connection(io::Error),
 }
 
-/// What is wrong with a file of certificates or keys in PEM.
+/// A fault of a file of certificates or keys in PEM.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum PemFault {
-    /// The file cannot be read, or is no PEM.
+    /// The file cannot be read, or is not PEM.
     Unreadable(pem::Error),
     /// The file has no certificate.
     NoCertificate,
@@ -151,8 +151,7 @@ pub(crate) async fn client_config(ca_file: Option<String>) -> Result<Arc<ClientC
     tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)
 }
 
-/// Reads what a listener needs that proves by the certificates of one file, in PEM, and the key of another,
-/// who it is.
+/// Reads the identity of a listener: the certificates in one file, in PEM, and the key in another.
 fn read_acceptor(certificate: &Path, key: &Path) -> Result<TlsAcceptor, TlsError> {
     let chain = certificates(certificate).map_err(|fault| TlsError::Own(certificate.into(), fault))?;
     let wrong_key = |fault| TlsError::Own(key.into(), fault);
@@ -166,13 +165,13 @@ fn read_acceptor(certificate: &Path, key: &Path) -> Result<TlsAcceptor, TlsError
     Ok(TlsAcceptor::from(Arc::new(config.map_err(|error| wrong_key(PemFault::Refused(error)))?)))
 }
 
-/// Returns the same, read where nobody waits for it.
+/// Returns the same, read in another thread.
 pub(crate) async fn acceptor(certificate: String, key: String) -> Result<TlsAcceptor, HostFailure> {
     let load = move || read_acceptor(Path::new(&certificate), Path::new(&key));
     tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)
 }
 
-/// What servers of an embedder secure their connections with.
+/// The identity by which servers of an embedder secure their connections.
 #[derive(Clone)]
 pub struct TlsIdentity(TlsAcceptor);
 
@@ -180,7 +179,7 @@ impl TlsIdentity {
     /// Reads the certificates of one file and the key of another, in PEM.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// The fault in them.
     pub fn read(certificate: &Path, key: &Path) -> Result<TlsIdentity, TlsError> {
         read_acceptor(certificate, key).map(TlsIdentity)
     }
@@ -188,7 +187,7 @@ impl TlsIdentity {
     /// Begins TLS over a connection to a client.
     ///
     /// # Errors
-    /// What the peer does wrong.
+    /// The fault of the peer.
     pub async fn accept<S: AsyncRead + AsyncWrite + Unpin>(
         &self,
         stream: S,

@@ -2,7 +2,8 @@
 //! the form to write instead.
 //!
 //! The compiler looks a name up when the program does not define it, so a program may define any of these. A
-//! test in `conformance/tests/language/habits.rs` checks that no row is a name of ESL. To add a word, add a row.
+//! test in `conformance/tests/language/habits.rs` checks that no row is a name of ESL. To add a word, add a
+//! row.
 
 use std::sync::LazyLock;
 

@@ -251,7 +251,8 @@ fn calls_of_what_failed_to_be_defined_are_not_blamed() {
 
 #[test]
 fn the_programs_in_the_table_of_codes_have_them() {
-    // These need a library, or a machine that runs what is loaded: `conformance/tests/language/codes.rs` has all.
+    // These need a library, or a machine that runs what is loaded: `conformance/tests/language/codes.rs` has
+    // all.
     let needs_library = [
         "assignment-to-constant",
         "macro-failed",

@@ -347,7 +347,7 @@ unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, index: usize)
 /// The frame at `base` is the running one, and constant `index` of its function is for a class.
 unsafe fn class_constant(vm: &mut Vm, base: *mut Value, index: usize) -> Value {
     // SAFETY: F2: the running function is below the registers; by the contract its code has such a constant,
-    // and nobody else looks at it meanwhile.
+    // and nothing else refers to it meanwhile.
     unsafe {
         let constant = constants_of(code_of(*base.sub(2))).add(index).cast_mut();
         let name =

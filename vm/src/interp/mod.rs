@@ -10,9 +10,9 @@
 //! up before it has had any effect. Preemption, collection and aborts happen there and nowhere else, save
 //! that an instruction for which there is no room is given up too, and done again after a collection.
 //!
-//! What the interpreter takes for granted of code is the list V1 to V14 in `esl_bytecode::verify`; its
-//! `SAFETY:` notes name the items. What it owes in return is M1 to M6 there. The notes also name facts that
-//! it establishes itself:
+//! The interpreter relies on the facts V1 to V14 about code in `esl_bytecode::verify`; its `SAFETY:` notes
+//! name the items. Its obligations in return are M1 to M6 there. The notes also name facts that it
+//! establishes itself:
 //!
 //! * **F1, registers of the machine.** When the loop is left, `Cpu::pc` is at an instruction of the running
 //!   function's code, or in a stub, and `Cpu::base` is the base of the running frame.
@@ -374,7 +374,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
     // SAFETY: for the whole loop, V1 makes every word reached an instruction with its aux word; V3 keeps
     // registers inside the frame, for which the call made room (F2); V4 keeps constants inside the code; V6
     // makes every register read hold an object of the program, whose value is the address of a live object.
-    // What depends on data is tested before it is used (M6).
+    // Facts that depend on data are tested before they are used (M6).
     let signal = unsafe {
         let mut word = loaded_word_at(pc);
         loop {

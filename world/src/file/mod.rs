@@ -6,7 +6,7 @@
 //! data come.
 //!
 //! A regular file that is written is opened for each part, by the path that was permitted, so that a stream
-//! that nobody closes takes no descriptor; one that is read as text is closed at its end.
+//! left open takes no descriptor; one that is read as text is closed at its end.
 
 use std::fs::{File, OpenOptions};
 use std::io::Error;
@@ -28,7 +28,7 @@ use open::{FileAccess, Open, WrittenAt};
 const CHUNK: usize = 1 << 15;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What it guards is whole at every moment, so a panic elsewhere does not corrupt it.
+    // The guarded data are consistent at every moment, so a panic elsewhere does not corrupt them.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -75,7 +75,7 @@ impl FileSlot {
     fn close(&self) {
         let stage = std::mem::replace(&mut *lock(&self.0), FileStage::Closed);
         if let FileStage::Open(open) = stage {
-            // Nobody may wait for it.
+            // No operation may wait for it.
             _ = open.closing.send(true);
         }
     }
@@ -335,7 +335,7 @@ async fn open_input(file: HostHandle<FileSlot>, path: String, as_text: bool) -> 
     let access = polled.unwrap_or_else(|| FileAccess::Threads(Mutex::new(Some(file))));
     slot.set(Open::new(access, text));
     if is_regular {
-        // What cannot be read fails here, and a short file is there at once.
+        // An unreadable file fails here, and a short one is read at once.
         return answer(slot.get()?.fill().await.map(|()| true));
     }
     answer(Ok(false))
@@ -380,7 +380,7 @@ fn is_device(path: &Path) -> bool {
     })
 }
 
-/// Opens a FIFO, when somebody reads it, or a device, for output.
+/// Opens a FIFO, once it has a reader, or a device, for output.
 #[cfg(unix)]
 async fn open_device(slot: &FileSlot, path: PathBuf) -> Result<(), Error> {
     let mut pause = std::time::Duration::from_millis(1);
@@ -393,7 +393,7 @@ async fn open_device(slot: &FileSlot, path: PathBuf) -> Result<(), Error> {
                 slot.set(Open::new(access, None));
                 return Ok(());
             }
-            // The system tells nobody when a reader comes, so it is asked again.
+            // The system does not report the arrival of a reader, so it is asked again.
             Err(error)
                 if error.raw_os_error() == Some(rustix::io::Errno::NXIO.raw_os_error()) && is_fifo(&path) =>
             {

@@ -37,7 +37,7 @@ pub(super) struct Open {
     /// The path, if it is read as text, and then closed at its end.
     pub(super) text: Option<PathBuf>,
     pub(super) arrived: Mutex<Arrived>,
-    /// Held by the one who reads or writes.
+    /// Held by the operation that reads or writes.
     pub(super) turn: tokio::sync::Mutex<()>,
     /// Changes when the file is closed.
     pub(super) closing: watch::Sender<bool>,

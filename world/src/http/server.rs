@@ -48,7 +48,7 @@ const GOODBYE: Duration = Duration::from_secs(1);
 
 type HttpAnswer = Response<Full<Bytes>>;
 
-/// What the connections of a server share with the operations.
+/// The state that the connections of a server share with the operations.
 struct ServerState {
     input: HostInput,
     /// Where the answers go, by the numbers of their requests; the greatest number so far.
@@ -166,7 +166,7 @@ async fn listen(
     Ok(port)
 }
 
-/// What connections are secured with, if they are.
+/// The identity by which connections are secured, if they are.
 #[derive(Clone)]
 struct Secured(#[cfg(feature = "tls")] Option<tokio_rustls::TlsAcceptor>);
 

@@ -49,7 +49,7 @@ impl Driver {
                     {
                         let mut state = self.shared.state();
                         state.problem = Some(error.to_string());
-                        // Who waits for an answer hears that there will be none.
+                        // Operations that wait for an answer learn that none will come.
                         state.subscribing.clear();
                         state.asked.clear();
                         state.publishing.clear();

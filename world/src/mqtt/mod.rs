@@ -48,7 +48,7 @@ const GOODBYE: Duration = Duration::from_secs(2);
 /// How a subscription has come out.
 type Subscribed = oneshot::Sender<bool>;
 
-/// What the task on the event loop shares with the operations.
+/// The state that the task on the event loop shares with the operations.
 #[derive(Default)]
 struct State {
     /// Messages that have yet to be delivered.
@@ -56,15 +56,15 @@ struct State {
     subscriptions: Vec<Subscription>,
     /// The greatest number of a subscription so far.
     subscribed: u64,
-    /// Who waits for the answers to subscriptions that have yet to be sent, in their order; nobody for one
-    /// that is made again.
+    /// Receivers of the answers to subscriptions that have yet to be sent, in their order; `None` for one
+    /// that is renewed.
     subscribing: VecDeque<Option<Subscribed>>,
-    /// Who waits for those to subscriptions that were sent, by the protocol's numbers.
+    /// Receivers of the answers to subscriptions that were sent, by the protocol's numbers.
     asked: HashMap<u16, Option<Subscribed>>,
-    /// Who waits for the acknowledgements of messages that have yet to be sent, in the order of the requests,
+    /// Receivers of the acknowledgements of messages that have yet to be sent, in the order of the requests,
     /// with numbers of their own.
     publishing: VecDeque<(u64, oneshot::Sender<()>)>,
-    /// Who waits for those of messages that were sent, by the protocol's numbers.
+    /// Receivers of the acknowledgements of messages that were sent, by the protocol's numbers.
     sent: HashMap<u16, oneshot::Sender<()>>,
     /// Number of messages that are being handed over.
     handing_over: usize,
@@ -79,7 +79,8 @@ struct ClientState {
     came: Notify,
     /// Notified when messages were delivered, and when the program asks for something.
     taken: Notify,
-    /// Held by who hands over a message that is acknowledged, so that the order of the requests is known.
+    /// Held by the operation that hands over a message to be acknowledged, so that the order of the requests
+    /// is known.
     turn: tokio::sync::Mutex<u64>,
 }
 
@@ -291,7 +292,7 @@ async fn open(
             () = deliver(&delivering) => {}
         }
         drop(sender);
-        // Nobody may wait for it.
+        // No operation may wait for it.
         _ = end.send(true);
     };
     event_loop::spawn(drive).map_err(mqtt_failure)?;

@@ -1,8 +1,8 @@
 //! Connections, over TCP and Unix sockets and whatever else has two ends.
 //!
-//! What has arrived is kept here until the program takes it, which it does at once, without waiting: an
-//! operation only waits until something is there. So nothing is lost when a call is left at the moment at
-//! which its data come.
+//! Arrived data stay here until the program takes them, which it does at once, without waiting: an operation
+//! only waits until data are there. So nothing is lost when a call is left at the moment at which its data
+//! come.
 //!
 //! A connection reads ahead at most [`super::CHUNK`] bytes; a peer that sends more waits.
 
@@ -79,12 +79,13 @@ impl Writer {
     }
 }
 
-/// Those who wait for a connection, in the order in which they came, and the greatest of their numbers.
+/// The operations that wait for a connection, in the order in which they came, and the greatest of their
+/// numbers.
 #[derive(Default)]
 struct Waiting(Mutex<(u64, BTreeMap<u64, Waker>)>);
 
 impl Waiting {
-    /// Notes who waits, and returns the number, which is the one given if there is one.
+    /// Notes a waiting operation, and returns its number, which is the given one if there is one.
     fn note(&self, number: Option<u64>, waker: &Waker) -> u64 {
         let mut waiting = lock(&self.0);
         let number = number.unwrap_or(waiting.0 + 1);
@@ -127,7 +128,7 @@ impl Future for Arrival {
         let connection = self.connection.clone()?;
         let has_data = || lock(&connection.arrived).is_something();
         if self.number.is_none() && has_data() && !connection.is_closed.load(Ordering::SeqCst) {
-            // Nobody need be told of one who does not wait.
+            // An operation that need not wait is not noted.
             return Poll::Ready(Ok(()));
         }
         // Before anything is asked, so that nothing is missed.
@@ -138,7 +139,7 @@ impl Future for Arrival {
         if has_data() {
             return Poll::Ready(Ok(()));
         }
-        // The system tells one only, who tells the others.
+        // The system wakes one waker only, which wakes the others.
         let waker = Waker::from(connection.waiting.clone());
         let arrival = ready!(connection.poll_arrival(&mut Context::from_waker(&waker)));
         connection.waiting.wake_all();
@@ -199,7 +200,7 @@ impl Connection {
         (port, stream.peer_addr().map_or(String::new(), |address| address.to_string()))
     }
 
-    /// Reads what has arrived, or notes that the connection has ended. Of those who wait all are woken.
+    /// Reads arrived data, or notes that the connection has ended. All waiting operations are woken.
     fn poll_arrival(&self, context: &mut Context<'_>) -> Poll<Result<(), Error>> {
         READ.with_borrow_mut(|bytes| {
             let mut bytes = ReadBuf::new(bytes);
@@ -218,7 +219,7 @@ impl Connection {
             let mut end = Box::pin(async move { connection.end().await });
             // Mostly it is said at once, which is as well if the process ends now.
             if end.as_mut().poll(&mut Context::from_waker(Waker::noop())).is_pending() {
-                // Without the event loop there is nobody to be told.
+                // Without the event loop the end of the data cannot be sent.
                 _ = event_loop::spawn(async move { drop(tokio::time::timeout(GOODBYE, end).await) });
             }
         }

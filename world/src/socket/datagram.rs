@@ -52,7 +52,7 @@ pub(super) async fn wait(socket: HostHandle<Socket>) -> Result<(), HostFailure> 
     let receive = async {
         loop {
             udp.readable().await.map_err(|error| socket_failure(&error))?;
-            // Who waits has no room of its own.
+            // Waiting operations have no buffer of their own.
             let received = READ.with_borrow_mut(|room| {
                 udp.try_recv_from(room)
                     .map(|(count, address)| (Bytes::copy_from_slice(&room[..count]), address.to_string()))

@@ -13,7 +13,7 @@ use super::{
     unless_closed,
 };
 
-/// Time that a peer has to prove who it is, and to be shown who we are.
+/// Time that a TLS handshake with a peer may take.
 #[cfg(feature = "tls")]
 const GREETING: Duration = Duration::from_secs(10);
 /// Most peers that are greeted at a time; more wait in the system's queue.
@@ -93,7 +93,7 @@ fn bind_to(address: std::net::SocketAddr) -> std::io::Result<TcpListener> {
 }
 
 /// Returns whether an error is no fault of a listener: the peer has gone already, or there is no descriptor
-/// or memory for one more, until somebody else gives some back.
+/// or memory for one more, until some are released.
 fn is_passing(error: &Error) -> bool {
     #[cfg(unix)]
     if let Some(error) = rustix::io::Errno::from_io_error(error) {
@@ -149,7 +149,7 @@ async fn accept_secured(
 
 /// Returns the failure for an address that cannot be used here.
 pub(crate) fn bind_failure(error: &Error) -> HostFailure {
-    // What the resolver says is no error of the system.
+    // An error of the resolver has no number of the system.
     if error.raw_os_error().is_none() {
         HostFailure::new("HOST-NOT-FOUND", error)
     } else {

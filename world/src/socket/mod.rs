@@ -38,7 +38,7 @@ thread_local! {
 /// A connection, its port here, and the address there.
 type NewConnection = (SocketKind, i64, String);
 
-/// What a socket is.
+/// The kind of a socket.
 #[derive(Clone)]
 pub(crate) enum SocketKind {
     /// Not connected yet.
@@ -52,7 +52,7 @@ pub(crate) enum SocketKind {
 
 /// A socket of the program's.
 pub(crate) struct Socket {
-    /// What it is, its port here, and the address there.
+    /// Its kind, its port here, and the address there.
     state: Mutex<NewConnection>,
     /// Becomes true when the socket is closed.
     closing: watch::Sender<bool>,
@@ -63,7 +63,7 @@ impl HostObject for Socket {
 }
 
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What it guards is whole at every moment, so a panic elsewhere does not corrupt it.
+    // The guarded data are consistent at every moment, so a panic elsewhere does not corrupt them.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -124,7 +124,7 @@ impl Socket {
 
     fn close(&self) {
         let kind = std::mem::replace(&mut lock(&self.state).0, SocketKind::Closed);
-        // Nobody may wait for it.
+        // No operation may wait for it.
         self.closing.send_replace(true);
         close_kind(&kind);
     }
@@ -158,14 +158,14 @@ fn close_kind(kind: &SocketKind) {
     }
 }
 
-/// Closes the connections of a listener that is closed, which nobody can take any more.
+/// Closes the accepted connections of a closed listener, which cannot be taken any more.
 fn close_untaken(accepted: &Mutex<VecDeque<NewConnection>>) {
     let untaken = std::mem::take(&mut *lock(accepted));
     untaken.iter().for_each(|(kind, ..)| close_kind(kind));
 }
 
 /// Returns what a future comes to, unless the socket is closed before. It is not moved here, which would
-/// double the size of whoever waits.
+/// double the size of the waiting future.
 async fn unless_closed<T>(
     mut closing: watch::Receiver<bool>,
     future: Pin<&mut impl Future<Output = Result<T, HostFailure>>>,

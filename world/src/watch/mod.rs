@@ -56,7 +56,7 @@ impl Following {
         let loses = has_lost.clone();
         let (sender, events) = channel(MOST_KEPT);
         let watcher = notify::recommended_watcher(move |event: notify::Result<Event>| {
-            // After the end nobody wants to know.
+            // The receiver is gone after the end.
             if !event.is_ok_and(|event| !event.need_rescan() && sender.try_send(event).is_ok()) {
                 loses.store(true, Ordering::Relaxed);
             }

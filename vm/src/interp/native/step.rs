@@ -19,7 +19,7 @@ use crate::raise::Exit;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// What an instruction has come to that the machine has done for machine code.
+/// The outcome of an instruction that the machine has executed for machine code.
 enum Done {
     /// The next one follows. What a fast way of the loop does asks for no safepoint.
     Fast,
