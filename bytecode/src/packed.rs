@@ -12,8 +12,8 @@ use bytes::Bytes;
 /// A vector of numbers of one kind.
 ///
 /// To a program, bytes are a vector with the element type `(unsigned-byte 8)`; the others are simple vectors.
-/// From a program come as [`PackedVector::Bytes`] all vectors with that element type, and as
-/// [`PackedVector::Floats`] all vectors whose elements are floats, of which there is at least one.
+/// From a program come as [`PackedVector::Bytes`] all vectors with that element type and those of bits, and
+/// as [`PackedVector::Floats`] all vectors whose elements are floats, of which there is at least one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PackedVector {
     /// Integers below 256.

@@ -56,6 +56,11 @@ fn vectors_of_numbers_cross_the_border_as_wholes() {
         "(same (make-array 3 :element-type '(unsigned-byte 8) :fill-pointer 2 :initial-element 9))",
         "#(9 9)",
     );
+    check("(list (sum #*101) (sum (make-array 5 :fill-pointer 2 :initial-element 200)))", "(2 400)");
+    check("(same (make-array 3 :fill-pointer 2 :initial-element :x))", "#(:X :X)");
+    let text = "(make-array 3 :element-type 'character :fill-pointer 2 :initial-element #\\a)";
+    check(&format!("(list (same {text}) (same (list {text})))"), "(\"aa\" (\"aa\"))");
+    check("(same (list (make-array 3 :adjustable t :initial-element '(a)) #()))", "(#((A) (A) (A)) #())");
     assert_eq!(engine.eval(bytes).expect("it is evaluated"), Data::bytes(vec![0, 255]));
     assert_eq!(engine.eval("(vector 0.5 2.0)").expect("it is evaluated"), Data::floats([0.5, 2.0]));
     let numbers = Data::Vector(vec![Data::Integer(1), Data::Float(2.0)]);

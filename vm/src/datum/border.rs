@@ -23,9 +23,10 @@ pub(crate) fn export(heap: &Heap, names: &Names, value: Value) -> Result<(Datum,
         let work = work_of(&datum);
         return Ok((datum, work));
     }
-    if let Some(vector) = packed::vector_of(heap, value)? {
-        let work = vector.work();
-        return Ok((Datum::new(DatumKind::Packed(vector), Span::default()), work));
+    if let Some(kind) = packed::whole_of(heap, value)? {
+        let datum = Datum::new(kind, Span::default());
+        let work = work_of(&datum);
+        return Ok((datum, work));
     }
     let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
     if names.is_symbol(heap, value) {

@@ -349,18 +349,19 @@ impl Unit {
         }
         let span = known.filter(|_| !is_made).map_or(span, |known| known.span());
         let datum = match parts_of(heap, object) {
-            Some(ObjectParts::Items(None, _)) => Datum::new(DatumKind::Vector(parts.into()), span),
             Some(ObjectParts::Items(Some(dimensions), _)) => {
                 let dimensions = dimensions.iter().map(|size| size.as_index().unwrap_or(0) as u32).collect();
                 Datum::new(DatumKind::Array(dimensions, parts.into()), span)
             }
-            _ => {
+            Some(ObjectParts::Pair(..)) => {
                 let mut parts = parts.into_iter();
                 match (parts.next(), parts.next()) {
                     (Some(car), Some(cdr)) => Datum::cons(car, cdr, span),
                     _ => Datum::nil(span),
                 }
             }
+            // Only for the embedder vectors of all kinds have parts.
+            Some(ObjectParts::Items(None, _)) | None => Datum::new(DatumKind::Vector(parts.into()), span),
         };
         self.remember(&datum, object);
         datum

@@ -1,11 +1,12 @@
-//! Vectors of numbers, which cross the border to the host as wholes.
+//! Vectors of numbers, and strings of all kinds, which cross the border to the host as wholes.
 
 use esl_bytecode::Bytes;
+use esl_bytecode::datum::DatumKind;
 use esl_bytecode::packed::PackedVector;
 use esl_heap::array::{ArrayElements, vector_elements};
 
 use super::DatumError;
-use crate::heap::{AllocError, Heap};
+use crate::heap::{AllocError, Heap, Kind};
 use crate::names::load::integer;
 use crate::value::Value;
 
@@ -25,24 +26,30 @@ pub(super) fn value_of(heap: &mut Heap, vector: &PackedVector) -> Result<Value, 
     heap.alloc_vector(&elements)
 }
 
-/// Returns the vector that an object is, if its elements are bytes by their type, or floats, of which there
-/// is at least one.
+/// Returns the datum that a vector is as a whole: bytes, if its elements are bytes or bits by their type;
+/// floats, if all elements are, of which there is at least one; a string, if it is one with a fill pointer
+/// or the like.
 ///
 /// # Errors
 /// [`DatumError::NoRoom`], if there is no room for a copy.
-pub(super) fn vector_of(heap: &Heap, object: Value) -> Result<Option<PackedVector>, DatumError> {
+pub(super) fn whole_of(heap: &Heap, object: Value) -> Result<Option<DatumKind>, DatumError> {
     let check_room = |bytes: usize| if bytes > heap.room() { Err(DatumError::NoRoom(bytes)) } else { Ok(()) };
     match vector_elements(heap, object) {
-        Some(ArrayElements::Bytes(bytes)) => {
+        Some(ArrayElements::Bytes(bytes) | ArrayElements::Bits(bytes)) => {
             check_room(bytes.len())?;
-            Ok(Some(PackedVector::Bytes(Bytes::copy_from_slice(bytes))))
+            Ok(Some(DatumKind::Packed(PackedVector::Bytes(Bytes::copy_from_slice(bytes)))))
         }
         Some(ArrayElements::Values(values))
             if !values.is_empty() && values.iter().all(|&value| heap.as_double(value).is_some()) =>
         {
             check_room(size_of_val(values))?;
             let floats = values.iter().map(|&value| heap.as_double(value).unwrap_or(f64::NAN));
-            Ok(Some(PackedVector::Floats(floats.collect())))
+            Ok(Some(DatumKind::Packed(PackedVector::Floats(floats.collect()))))
+        }
+        Some(ArrayElements::Characters(codes)) if heap.is(object, Kind::Array) => {
+            check_room(size_of_val(codes))?;
+            let character = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
+            Ok(Some(DatumKind::String(codes.iter().map(character).collect::<String>().into())))
         }
         _ => Ok(None),
     }

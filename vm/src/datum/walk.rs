@@ -2,8 +2,9 @@
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
+use esl_heap::array::{ArrayElements, vector_elements};
 
-use super::{DatumError, MAX_NODES, NODE_BYTES, Unit, packed};
+use super::{DatumError, MAX_NODES, NODE_BYTES, Unit, packed, work_of};
 use crate::heap::layout::Array;
 use crate::heap::{Heap, Kind};
 use crate::names::load::integer_of;
@@ -143,13 +144,16 @@ impl DatumWalk {
                         continue;
                     }
                     if unit.is_for_embedder
-                        && let Some(vector) = packed::vector_of(heap, object).map_err(WalkError::Datum)?
+                        && let Some(kind) = packed::whole_of(heap, object).map_err(WalkError::Datum)?
                     {
-                        unit.work += vector.work() as u64 - 1;
-                        self.made.push(Datum::new(DatumKind::Packed(vector), span));
+                        let datum = Datum::new(kind, span);
+                        unit.work += work_of(&datum) as u64 - 1;
+                        self.made.push(datum);
                         continue;
                     }
-                    let Some(parts) = parts_of(heap, object) else {
+                    let parts = parts_of(heap, object);
+                    let parts = parts.or_else(|| vector_parts(heap, object).filter(|_| unit.is_for_embedder));
+                    let Some(parts) = parts else {
                         self.made.push(unit.atom_datum(heap, names, object, span));
                         continue;
                     };
@@ -248,6 +252,15 @@ pub(super) fn parts_of(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
             let items = heap.vector(array.data).filter(|_| is_plain && dimensions.len() != 1)?;
             Some(ObjectParts::Items(Some(dimensions), items))
         }
+        _ => None,
+    }
+}
+
+/// The elements of a vector of another kind, such as one with a fill pointer: to the embedder it is as good
+/// as a simple one.
+fn vector_parts(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
+    match vector_elements(heap, object)? {
+        ArrayElements::Values(items) => Some(ObjectParts::Items(None, items)),
         _ => None,
     }
 }
