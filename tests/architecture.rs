@@ -9,12 +9,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Sections of the code map, and the folders whose modules their tables list.
-const SECTIONS: [(&str, &str); 10] = [
+const SECTIONS: [(&str, &str); 11] = [
     ("### `bytecode/`", "bytecode/src"),
     ("### `compiler/`", "compiler/src"),
     ("### `heap/`", "heap/src"),
     ("### `host/`", "host/src"),
     ("### `database/`", "database/src"),
+    ("### `number/`", "number/src"),
     ("### `native/`", "native/src"),
     ("### `vm/`", "vm/src"),
     ("### `world/`", "world/src"),
@@ -99,7 +100,8 @@ fn the_map_is_short() {
 }
 
 /// Crates whose README has a table of their modules.
-const CRATES_WITH_TABLES: [&str; 7] = ["bytecode", "compiler", "database", "heap", "host", "native", "vm"];
+const CRATES_WITH_TABLES: [&str; 8] =
+    ["bytecode", "compiler", "database", "heap", "host", "native", "number", "vm"];
 
 #[test]
 fn the_readme_of_a_crate_lists_its_public_modules() {
@@ -390,7 +392,7 @@ fn each_type_name_means_one_thing() {
 #[test]
 fn the_compiler_and_the_machine_ask_a_host_for_all_that_a_browser_lacks() {
     let lacking = ["thread", "fs", "net", "process", "env", "time", "os"].map(|name| format!("std::{name}"));
-    for folder in ["bytecode/src", "compiler/src", "database/src", "heap/src", "vm/src"] {
+    for folder in ["bytecode/src", "compiler/src", "database/src", "heap/src", "number/src", "vm/src"] {
         for path in product_sources(root().join(folder)) {
             let text = fs::read_to_string(&path).expect("a source can be read");
             let product = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();

@@ -3,7 +3,6 @@
 #![deny(unsafe_code)]
 
 pub use esl_heap::{allocator, heap, value};
-pub use esl_host as host;
 
 pub(crate) use esl_heap::{character, equality, saved_pc, stack, table};
 

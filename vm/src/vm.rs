@@ -13,7 +13,7 @@ use crate::heap::Heap;
 use crate::names::Names;
 use crate::observe::Watch;
 use crate::outside::Outside;
-use crate::raise::Outcome;
+use crate::raise::{Exit, Outcome};
 use crate::schedule::Scheduler;
 use crate::tier::CompiledFunctions;
 pub use crate::tier::{Tier, TierReport};
@@ -62,5 +62,16 @@ impl Vm {
     /// Returns a short text for a value.
     pub fn describe(&self, value: Value) -> String {
         describe(&self.heap, value)
+    }
+
+    /// Returns several values; just the first if the caller wants one.
+    #[inline]
+    pub(crate) fn give_values(&mut self, values: &[Value]) -> Outcome {
+        if self.cpu.wants_one {
+            return Ok(values.first().copied().unwrap_or(Value::NIL));
+        }
+        self.exchange.values.clear();
+        self.exchange.values.extend_from_slice(values);
+        Err(Exit::Values)
     }
 }

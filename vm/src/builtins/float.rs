@@ -13,7 +13,7 @@ macro_rules! functions {
     ($( $(#[doc = $doc:literal])* $name:ident = $function:ident; )*) => {
         $( $(#[doc = $doc])* pub(super) fn $name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             const FUNCTION: Elementary = elementary::$function;
-            FUNCTION.apply(vm, arguments[0])
+            vm.with_numbers(|numbers| FUNCTION.apply(numbers, arguments[0]))
         } )*
     };
 }
@@ -33,30 +33,30 @@ functions! {
 }
 
 pub(super) fn atan(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match *arguments {
-        [y, x] => elementary::angle(vm, y, x),
-        _ => elementary::ATAN.apply(vm, arguments[0]),
-    }
+    vm.with_numbers(|numbers| match *arguments {
+        [y, x] => elementary::angle(numbers, y, x),
+        _ => elementary::ATAN.apply(numbers, arguments[0]),
+    })
 }
 
 pub(super) fn exp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    power::exp(vm, arguments[0])
+    vm.with_numbers(|numbers| power::exp(numbers, arguments[0]))
 }
 
 pub(super) fn log(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match *arguments {
-        [number, base] => power::log_in_base(vm, number, base),
-        _ => power::log(vm, arguments[0]),
-    }
+    vm.with_numbers(|numbers| match *arguments {
+        [number, base] => power::log_in_base(numbers, number, base),
+        _ => power::log(numbers, arguments[0]),
+    })
 }
 
 pub(super) fn expt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [base, power] = exactly(arguments);
-    power::expt(vm, base, power)
+    vm.with_numbers(|numbers| power::expt(numbers, base, power))
 }
 
 pub(super) fn sqrt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    power::sqrt(vm, arguments[0])
+    vm.with_numbers(|numbers| power::sqrt(numbers, arguments[0]))
 }
 
 pub(super) fn numerator(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -96,7 +96,7 @@ pub(super) fn rationalize(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 fn convert(vm: &mut Vm, op: &'static str, v: Value, from_float: fn(f64) -> Ratio) -> Outcome {
     match vm.heap.as_double(v) {
-        Some(x) if x.is_finite() => vm.ratio_value(op, &from_float(x)),
+        Some(x) if x.is_finite() => vm.with_numbers(|numbers| numbers.ratio_value(op, &from_float(x))),
         Some(_) => vm.exchange.raise(Raised::Arithmetic(op, "the float is not a finite number".into())),
         None if crate::number::is_rational(&vm.heap, v) => Ok(v),
         None => vm.exchange.type_error(v, "REAL"),
@@ -153,7 +153,8 @@ pub(super) fn scale_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let x = finite_float(vm, "SCALE-FLOAT", float)?;
     let exponent = vm.integer(exponent)?;
     let extreme = if exponent.is_negative() { i64::MIN } else { i64::MAX };
-    vm.float_value("SCALE-FLOAT", float::scaled(x, exponent.as_fixnum().unwrap_or(extreme)))
+    let scaled = float::scaled(x, exponent.as_fixnum().unwrap_or(extreme));
+    vm.with_numbers(|numbers| numbers.float_value("SCALE-FLOAT", scaled))
 }
 
 pub(super) fn float_sign(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -206,18 +207,24 @@ pub(super) fn decimal_digits(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn make_random_state(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let seed = arguments[0];
     if seed.is_nil() {
-        return random::make_state(vm, vm.config.seed);
+        let seed = vm.config.seed;
+        return vm.with_numbers(|numbers| random::make_state(numbers, seed));
     }
     match Int::of(&vm.heap, seed) {
-        Some(n) => random::make_state(vm, n.limbs().1.iter().fold(0, |seed, &limb| seed ^ limb)),
-        None => random::copy_state(vm, seed),
+        Some(n) => {
+            let seed = n.limbs().1.iter().fold(0, |seed, &limb| seed ^ limb);
+            vm.with_numbers(|numbers| random::make_state(numbers, seed))
+        }
+        None => vm.with_numbers(|numbers| random::copy_state(numbers, seed)),
     }
 }
 
 pub(super) fn random(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [limit, state] = exactly(arguments);
     match crate::number::sign_of(&vm.heap, limit) {
-        Some(1) if vm.heap.ratio(limit).is_none() => random::random(vm, limit, state),
+        Some(1) if vm.heap.ratio(limit).is_none() => {
+            vm.with_numbers(|numbers| random::random(numbers, limit, state))
+        }
         _ => vm.exchange.not_written(limit, "(OR (INTEGER 1) (FLOAT (0)))"),
     }
 }

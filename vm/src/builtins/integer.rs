@@ -2,7 +2,7 @@
 
 use crate::equality::characters_of;
 use crate::number::bits::{self, BitOperation};
-use crate::number::{Int, gcd, limit, power, text};
+use crate::number::{self, Int, gcd, limit, power, text};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -23,7 +23,7 @@ fn fold(vm: &mut Vm, operation: BitOperation, identity: i32, integers: &[Value])
                 if vm.exchange.charges.ticks() > ceiling {
                     return Err(Exit::Slowly);
                 }
-                result = bits::join(vm, operation, result, integer)?;
+                result = vm.with_numbers(|numbers| bits::join(numbers, operation, result, integer))?;
             }
             Ok(result)
         }
@@ -46,7 +46,11 @@ pub(super) fn logxor(vm: &mut Vm, integers: &[Value]) -> Outcome {
 pub(super) fn logeqv(vm: &mut Vm, integers: &[Value]) -> Outcome {
     // Each pair turns the bits over once; an even number of integers leaves them turned.
     let joined = fold(vm, BitOperation::Xor, 0, integers)?;
-    if integers.len().is_multiple_of(2) { bits::complement(vm, joined) } else { Ok(joined) }
+    if integers.len().is_multiple_of(2) { complement(vm, joined) } else { Ok(joined) }
+}
+
+fn complement(vm: &mut Vm, integer: Value) -> Outcome {
+    vm.with_numbers(|numbers| bits::complement(numbers, integer))
 }
 
 /// Joins two integers, either of them and the result turned over or not.
@@ -84,18 +88,18 @@ pub(super) fn logorc2(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn lognot(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    bits::complement(vm, arguments[0])
+    complement(vm, arguments[0])
 }
 
 pub(super) fn logtest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [left, right] = exactly(arguments);
-    let joined = bits::join(vm, BitOperation::And, left, right)?;
+    let joined = vm.with_numbers(|numbers| bits::join(numbers, BitOperation::And, left, right))?;
     Ok((joined != Value::small(0)).into())
 }
 
 pub(super) fn logbitp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [index, integer] = exactly(arguments);
-    Ok(bits::bit(vm, index, integer)?.into())
+    Ok(vm.with_numbers(|numbers| bits::bit(numbers, index, integer))?.into())
 }
 
 pub(super) fn logcount(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -111,7 +115,7 @@ pub(super) fn integer_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn ash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [integer, count] = exactly(arguments);
-    bits::shift(vm, integer, count)
+    vm.with_numbers(|numbers| bits::shift(numbers, integer, count))
 }
 
 pub(super) fn evenp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -144,58 +148,66 @@ fn field(vm: &mut Vm, size: Value, position: Value) -> Result<(u64, u64), Exit> 
 pub(super) fn load_byte(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [size, position, integer] = exactly(arguments);
     let (size, position) = field(vm, size, position)?;
-    bits::field(vm, size, position, integer)
+    vm.with_numbers(|numbers| bits::field(numbers, size, position, integer))
 }
 
 pub(super) fn deposit_byte(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [new, size, position, integer] = exactly(arguments);
     let (size, position) = field(vm, size, position)?;
-    let (new, n) = (vm.integer(new)?, vm.integer(integer)?);
-    let result = bits::deposit(vm, &new, size, position, &n)?;
-    vm.integer_value("DPB", &result)
+    vm.with_numbers(|numbers| {
+        let (new, n) = (numbers.integer(new)?, numbers.integer(integer)?);
+        let result = bits::deposit(numbers, &new, size, position, &n)?;
+        numbers.integer_value("DPB", &result)
+    })
 }
 
 pub(super) fn gcd(vm: &mut Vm, integers: &[Value]) -> Outcome {
-    let mut divisor = Int::ZERO;
-    for &v in integers {
-        let n = vm.integer(v)?;
-        crate::number::check_gcd(vm, divisor.len(), n.len())?;
-        divisor = gcd::gcd(&divisor, &n);
-    }
-    vm.integer_value("GCD", &divisor)
+    vm.with_numbers(|numbers| {
+        let mut divisor = Int::ZERO;
+        for &v in integers {
+            let n = numbers.integer(v)?;
+            number::check_gcd(numbers, divisor.len(), n.len())?;
+            divisor = gcd::gcd(&divisor, &n);
+        }
+        numbers.integer_value("GCD", &divisor)
+    })
 }
 
 /// `%gcd-step`: two smaller integers with the same greatest common divisor, or the divisor and zero.
 pub(super) fn gcd_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [left, right] = exactly(arguments);
-    let (a, b) = (vm.integer(left)?, vm.integer(right)?);
-    let (long, short) = (a.len().max(b.len()), a.len().min(b.len()));
-    vm.check_work(2 * (long - short + 1), short)?;
-    let steps = gcd::steps_within_limit(long);
-    vm.exchange.charge(8 * long * steps);
-    let (a, b) = gcd::reduced(&a, &b, steps);
-    let (a, b) = (vm.integer_value("GCD", &a)?, vm.integer_value("GCD", &b)?);
-    vm.give_values(&[a, b])
+    let both = vm.with_numbers(|numbers| {
+        let (a, b) = (numbers.integer(left)?, numbers.integer(right)?);
+        let (long, short) = (a.len().max(b.len()), a.len().min(b.len()));
+        numbers.check_work(2 * (long - short + 1), short)?;
+        let steps = gcd::steps_within_limit(long);
+        numbers.charge(8 * long * steps);
+        let (a, b) = gcd::reduced(&a, &b, steps);
+        Ok([numbers.integer_value("GCD", &a)?, numbers.integer_value("GCD", &b)?])
+    })?;
+    vm.give_values(&both)
 }
 
 pub(super) fn lcm(vm: &mut Vm, integers: &[Value]) -> Outcome {
-    let mut multiple = Int::ONE;
-    for &v in integers {
-        let n = vm.integer(v)?;
-        crate::number::check_gcd(vm, multiple.len(), n.len())?;
-        let divisor = gcd::gcd(&multiple, &n);
-        multiple = if n.is_zero() || multiple.is_zero() {
-            Int::ZERO
-        } else {
-            multiple.times(&n.exact_quotient(&divisor)).abs()
-        };
-        vm.check_bits("LCM", multiple.bits())?;
-    }
-    vm.integer_value("LCM", &multiple)
+    vm.with_numbers(|numbers| {
+        let mut multiple = Int::ONE;
+        for &v in integers {
+            let n = numbers.integer(v)?;
+            number::check_gcd(numbers, multiple.len(), n.len())?;
+            let divisor = gcd::gcd(&multiple, &n);
+            multiple = if n.is_zero() || multiple.is_zero() {
+                Int::ZERO
+            } else {
+                multiple.times(&n.exact_quotient(&divisor)).abs()
+            };
+            numbers.check_bits("LCM", multiple.bits())?;
+        }
+        numbers.integer_value("LCM", &multiple)
+    })
 }
 
 pub(super) fn isqrt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    power::isqrt(vm, arguments[0])
+    vm.with_numbers(|numbers| power::isqrt(numbers, arguments[0]))
 }
 
 /// Returns a radix from 2 to 36.
@@ -210,7 +222,7 @@ pub(super) fn integer_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [integer, base] = exactly(arguments);
     let n = vm.integer(integer)?;
     let radix = radix(vm, base)?;
-    let text = text::integer_text(vm, &n, radix)?;
+    let text = vm.with_numbers(|numbers| text::integer_text(numbers, &n, radix))?;
     Ok(vm.heap.alloc_str(&text)?)
 }
 

@@ -1,6 +1,6 @@
 //! Arithmetic, comparison and rounding for any number of arguments.
 
-use crate::number::{self, Rounding, limit::WORK_LIMIT, rounding};
+use crate::number::{self, Rounding, limit::WORK_LIMIT};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -176,7 +176,7 @@ macro_rules! roundings {
     ($( $(#[doc = $doc:literal])* $name:ident = $function:ident $rounding:ident; )*) => {
         $( $(#[doc = $doc])* pub(super) fn $name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             let divisor = arguments.get(1).copied().unwrap_or(ONE);
-            rounding::$function(vm, Rounding::$rounding, arguments[0], divisor)
+            number::$function(vm, Rounding::$rounding, arguments[0], divisor)
         } )*
     };
 }

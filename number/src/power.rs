@@ -3,48 +3,46 @@
 //! Powers of exact numbers with an integer exponent are exact; all other results are doubles. Where the
 //! result is a complex number, these functions leave the work to their ESL twins.
 
+use esl_heap::Value;
 use num_traits::Pow;
 
 use super::limit::{self, BIT_LIMIT};
-use super::{Int, Number, Ratio, transcendental};
-use crate::raise::{Exit, Outcome, Raised};
-use crate::value::Value;
-use crate::vm::Vm;
+use super::{Int, Number, NumberFailure, NumberResult, NumberStop, Numbers, Ratio, transcendental};
 
 /// Implements `(expt base power)`.
-pub(crate) fn expt(vm: &mut Vm, base: Value, power: Value) -> Outcome {
-    let (x, y) = (vm.number(base, "NUMBER")?, vm.number(power, "NUMBER")?);
+pub fn expt(numbers: &mut Numbers<'_>, base: Value, power: Value) -> NumberResult {
+    let (x, y) = (numbers.number(base, "NUMBER")?, numbers.number(power, "NUMBER")?);
     match (x, y) {
         (x, Number::Int(y)) if y.is_zero() => match x {
-            Number::Float(_) => Ok(vm.heap.float(1.0)?),
+            Number::Float(_) => Ok(numbers.heap.float(1.0)?),
             _ => Ok(Value::small(1)),
         },
         (Number::Int(x), Number::Int(y)) => {
             if x.is_zero() && y.is_negative() {
-                return vm.exchange.raise(Raised::DivisionByZero("EXPT", [base, power]));
+                return numbers.fail(NumberFailure::DivisionByZero("EXPT", [base, power]));
             }
-            let result = int_power(vm, &x, &y.abs())?;
+            let result = int_power(numbers, &x, &y.abs())?;
             let result = Ratio::integer(result);
-            vm.ratio_value("EXPT", &if y.is_negative() { result.inverted() } else { result })
+            numbers.ratio_value("EXPT", &if y.is_negative() { result.inverted() } else { result })
         }
         (Number::Ratio(x), Number::Int(y)) => {
             let magnitude = y.abs();
-            let numerator = int_power(vm, &x.numerator, &magnitude)?;
-            let denominator = int_power(vm, &x.denominator, &magnitude)?;
+            let numerator = int_power(numbers, &x.numerator, &magnitude)?;
+            let denominator = int_power(numbers, &x.denominator, &magnitude)?;
             let result = Ratio { numerator, denominator };
-            vm.ratio_value("EXPT", &if y.is_negative() { result.inverted() } else { result })
+            numbers.ratio_value("EXPT", &if y.is_negative() { result.inverted() } else { result })
         }
         (_, y) => {
-            let x = vm.double_of("EXPT", base, "NUMBER")?;
+            let x = numbers.double_of("EXPT", base, "NUMBER")?;
             let is_float = matches!(y, Number::Float(_));
-            let y = vm.double_of("EXPT", power, "NUMBER")?;
-            real_power(vm, [base, power], is_float, x, y)
+            let y = numbers.double_of("EXPT", power, "NUMBER")?;
+            real_power(numbers, [base, power], is_float, x, y)
         }
     }
 }
 
 /// Returns an integer to the power of an exponent that is not negative. 0 to the power of 0 is 1.
-fn int_power(vm: &mut Vm, base: &Int, exponent: &Int) -> Result<Int, Exit> {
+fn int_power(numbers: &mut Numbers<'_>, base: &Int, exponent: &Int) -> NumberResult<Int> {
     if base.is_one() || exponent.is_zero() {
         return Ok(Int::ONE);
     }
@@ -59,10 +57,10 @@ fn int_power(vm: &mut Vm, base: &Int, exponent: &Int) -> Result<Int, Exit> {
     let zeros = base.trailing_zeros();
     let odd = base.shifted_right(zeros);
     let least_bits = (base.bits() - 1).saturating_mul(exponent).saturating_add(1);
-    vm.check_bits("EXPT", least_bits)?;
+    numbers.check_bits("EXPT", least_bits)?;
     let limbs = (odd.bits().saturating_mul(exponent) as usize).div_ceil(64);
     // The last product has factors of half the length; all others together cost a third of it.
-    vm.check_work(limbs / 2 + 1, if odd.bits() == 1 { 1 } else { limbs / 2 + 1 })?;
+    numbers.check_work(limbs / 2 + 1, if odd.bits() == 1 { 1 } else { limbs / 2 + 1 })?;
     let power = match odd {
         Int::Small(1) => Int::ONE,
         Int::Small(-1) => Int::Small(if exponent & 1 == 1 { -1 } else { 1 }),
@@ -75,57 +73,64 @@ fn int_power(vm: &mut Vm, base: &Int, exponent: &Int) -> Result<Int, Exit> {
         }
     };
     let shift = zeros * exponent;
-    vm.check_bits("EXPT", power.bits() + shift)?;
-    vm.exchange.charge(shift as usize / 64);
+    numbers.check_bits("EXPT", power.bits() + shift)?;
+    numbers.charge(shift as usize / 64);
     Ok(power.shifted_left(shift))
 }
 
-fn real_power(vm: &mut Vm, operands: [Value; 2], is_float: bool, x: f64, y: f64) -> Outcome {
+fn real_power(
+    numbers: &mut Numbers<'_>,
+    operands: [Value; 2],
+    is_float: bool,
+    x: f64,
+    y: f64,
+) -> NumberResult {
     if x == 0.0 && y == 0.0 && is_float {
-        return vm
-            .exchange
-            .raise(Raised::Arithmetic("EXPT", "zero to the power of a zero float has no value".into()));
+        return numbers.fail(NumberFailure::Arithmetic(
+            "EXPT",
+            "zero to the power of a zero float has no value".into(),
+        ));
     }
     if x == 0.0 && y < 0.0 {
-        return vm.exchange.raise(Raised::DivisionByZero("EXPT", operands));
+        return numbers.fail(NumberFailure::DivisionByZero("EXPT", operands));
     }
     if x < 0.0 && y.fract() != 0.0 {
-        return Err(Exit::Slowly);
+        return Err(NumberStop::Slowly);
     }
-    vm.float_value("EXPT", transcendental::pow(x, y))
+    numbers.float_value("EXPT", transcendental::pow(x, y))
 }
 
 /// Implements `(sqrt a)`.
-pub(crate) fn sqrt(vm: &mut Vm, a: Value) -> Outcome {
-    let x = vm.double_of("SQRT", a, "NUMBER")?;
+pub fn sqrt(numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
+    let x = numbers.double_of("SQRT", a, "NUMBER")?;
     if x < 0.0 {
-        return Err(Exit::Slowly);
+        return Err(NumberStop::Slowly);
     }
-    vm.float_value("SQRT", x.sqrt())
+    numbers.float_value("SQRT", x.sqrt())
 }
 
 /// Implements `(isqrt a)`: the greatest integer whose square is at most `a`.
-pub(crate) fn isqrt(vm: &mut Vm, a: Value) -> Outcome {
-    match Int::of(&vm.heap, a) {
+pub fn isqrt(numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
+    match Int::of(numbers.heap, a) {
         Some(n) if !n.is_negative() => {
             if n.len() > limit::ROOT_LIMBS {
-                return Err(Exit::Slowly);
+                return Err(NumberStop::Slowly);
             }
-            vm.exchange.charge(4 * n.len() * n.len());
+            numbers.charge(4 * n.len() * n.len());
             let root = match n {
                 Int::Small(n) => Int::from_unsigned(n.unsigned_abs().isqrt()),
                 Int::Big(n) => Int::from_big(n.sqrt()),
             };
-            vm.integer_value("ISQRT", &root)
+            numbers.integer_value("ISQRT", &root)
         }
-        _ => vm.exchange.type_error(a, "UNSIGNED-BYTE"),
+        _ => numbers.type_error(a, "UNSIGNED-BYTE"),
     }
 }
 
 /// Implements `(exp a)`.
-pub(crate) fn exp(vm: &mut Vm, a: Value) -> Outcome {
-    let x = vm.double_of("EXP", a, "NUMBER")?;
-    vm.float_value("EXP", transcendental::exp(x))
+pub fn exp(numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
+    let x = numbers.double_of("EXP", a, "NUMBER")?;
+    numbers.float_value("EXP", transcendental::exp(x))
 }
 
 /// The natural logarithm of 2 in two parts. The first has so few bits that its product with a bit count is
@@ -134,9 +139,9 @@ const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
 /// Implements `(log a)`.
-pub(crate) fn log(vm: &mut Vm, a: Value) -> Outcome {
-    let (bits, x) = log_parts(vm, a)?;
-    vm.float_value("LOG", natural_log(bits, x))
+pub fn log(numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
+    let (bits, x) = log_parts(numbers, a)?;
+    numbers.float_value("LOG", natural_log(bits, x))
 }
 
 /// Returns the natural logarithm of `x · 2^bits`.
@@ -145,38 +150,38 @@ fn natural_log(bits: f64, x: f64) -> f64 {
 }
 
 /// Implements `(log a base)`.
-pub(crate) fn log_in_base(vm: &mut Vm, a: Value, base: Value) -> Outcome {
-    vm.number(a, "NUMBER")?;
-    vm.number(base, "NUMBER")?;
-    if super::sign(vm, base, "NUMBER")? == 0 {
+pub fn log_in_base(numbers: &mut Numbers<'_>, a: Value, base: Value) -> NumberResult {
+    numbers.number(a, "NUMBER")?;
+    numbers.number(base, "NUMBER")?;
+    if super::sign(numbers, base, "NUMBER")? == 0 {
         return Ok(Value::POSITIVE_ZERO);
     }
-    let (a_bits, x) = log_parts(vm, a)?;
-    let (base_bits, y) = log_parts(vm, base)?;
-    if let Some(power) = exact_log(vm, a, base) {
-        return vm.float_value("LOG", power);
+    let (a_bits, x) = log_parts(numbers, a)?;
+    let (base_bits, y) = log_parts(numbers, base)?;
+    if let Some(power) = exact_log(numbers, a, base) {
+        return numbers.float_value("LOG", power);
     }
     let (numerator, denominator) = (natural_log(a_bits, x), natural_log(base_bits, y));
     if denominator == 0.0 {
-        return vm.exchange.raise(Raised::DivisionByZero("LOG", [a, base]));
+        return numbers.fail(NumberFailure::DivisionByZero("LOG", [a, base]));
     }
-    vm.float_value("LOG", numerator / denominator)
+    numbers.float_value("LOG", numerator / denominator)
 }
 
 /// Returns a number above zero as `(bits, x)`, meaning `x · 2^bits`; `bits` is 0 unless the number is beyond
 /// the doubles.
-fn log_parts(vm: &mut Vm, a: Value) -> Result<(f64, f64), Exit> {
-    let number = vm.number(a, "NUMBER")?;
+fn log_parts(numbers: &mut Numbers<'_>, a: Value) -> NumberResult<(f64, f64)> {
+    let number = numbers.number(a, "NUMBER")?;
     let (is_zero, is_negative) = match &number {
         Number::Int(n) => (n.is_zero(), n.is_negative()),
         Number::Ratio(r) => (false, r.numerator.is_negative()),
         Number::Float(x) => (*x == 0.0, *x < 0.0),
     };
     if is_zero {
-        return vm.exchange.raise(Raised::DivisionByZero("LOG", [a, Value::small(0)]));
+        return numbers.fail(NumberFailure::DivisionByZero("LOG", [a, Value::small(0)]));
     }
     if is_negative {
-        return Err(Exit::Slowly);
+        return Err(NumberStop::Slowly);
     }
     Ok(match number {
         Number::Float(x) => (0.0, x),
@@ -201,8 +206,8 @@ fn scaled(r: &Ratio) -> (f64, f64) {
 
 /// Returns the exponent if `a` is a power of `base` and both are integers; a quotient of rounded logarithms
 /// may miss it.
-fn exact_log(vm: &Vm, a: Value, base: Value) -> Option<f64> {
-    let (a, base) = (Int::of(&vm.heap, a)?, Int::of(&vm.heap, base)?);
+fn exact_log(numbers: &Numbers<'_>, a: Value, base: Value) -> Option<f64> {
+    let (a, base) = (Int::of(numbers.heap, a)?, Int::of(numbers.heap, base)?);
     if base.bits() < 2 || a.bits() > 4096 {
         return None;
     }
@@ -216,7 +221,7 @@ fn exact_log(vm: &Vm, a: Value, base: Value) -> Option<f64> {
 
 impl Int {
     /// Returns the number of zeros below the lowest one; 0 for zero.
-    pub(crate) fn trailing_zeros(&self) -> u64 {
+    pub fn trailing_zeros(&self) -> u64 {
         match self {
             Int::Small(0) => 0,
             Int::Small(n) => u64::from(n.trailing_zeros()),

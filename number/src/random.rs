@@ -6,16 +6,13 @@
 //! Source: Blackman and Vigna, "Scrambled linear pseudorandom number generators", 2021; SplitMix64 spreads
 //! the seed.
 
+use esl_heap::{Kind, Value};
 use num_bigint::{BigInt, BigUint};
 
-use super::{Int, Number};
-use crate::heap::Kind;
-use crate::raise::Outcome;
-use crate::value::Value;
-use crate::vm::Vm;
+use super::{Int, Number, NumberResult, Numbers};
 
 /// Returns a new state.
-pub(crate) fn make_state(vm: &mut Vm, seed: u64) -> Outcome {
+pub fn make_state(numbers: &mut Numbers<'_>, seed: u64) -> NumberResult {
     let mut words = Vec::with_capacity(8);
     let mut at = seed;
     for _ in 0..4 {
@@ -26,66 +23,66 @@ pub(crate) fn make_state(vm: &mut Vm, seed: u64) -> Outcome {
         z ^= z >> 31;
         words.extend([z as u32, (z >> 32) as u32]);
     }
-    state_of(vm, &words)
+    state_of(numbers, &words)
 }
 
 /// Returns a copy of `state`, which produces the same numbers.
-pub(crate) fn copy_state(vm: &mut Vm, state: Value) -> Outcome {
-    let words = words_of(vm, state)?;
-    let words = vm.heap.words(words).unwrap_or_default().to_vec();
-    state_of(vm, &words)
+pub fn copy_state(numbers: &mut Numbers<'_>, state: Value) -> NumberResult {
+    let words = words_of(numbers, state)?;
+    let words = numbers.heap.words(words).unwrap_or_default().to_vec();
+    state_of(numbers, &words)
 }
 
-fn state_of(vm: &mut Vm, words: &[u32]) -> Outcome {
-    let object = vm.heap.alloc_words(words.len(), 0)?;
-    if let Some(slots) = vm.heap.words_mut(object) {
+fn state_of(numbers: &mut Numbers<'_>, words: &[u32]) -> NumberResult {
+    let object = numbers.heap.alloc_words(words.len(), 0)?;
+    if let Some(slots) = numbers.heap.words_mut(object) {
         slots.copy_from_slice(words);
     }
-    Ok(vm.heap.alloc_record(Kind::RandomState, 0, 0, &[object])?)
+    Ok(numbers.heap.alloc_record(Kind::RandomState, 0, 0, &[object])?)
 }
 
-fn words_of(vm: &mut Vm, state: Value) -> Outcome {
-    match vm.heap.record(state, Kind::RandomState) {
+fn words_of(numbers: &mut Numbers<'_>, state: Value) -> NumberResult {
+    match numbers.heap.record(state, Kind::RandomState) {
         Some(&[words]) => Ok(words),
-        _ => vm.exchange.type_error(state, "RANDOM-STATE"),
+        _ => numbers.type_error(state, "RANDOM-STATE"),
     }
 }
 
 /// Returns a number from 0 to below `limit`, of the type of `limit`.
-pub(crate) fn random(vm: &mut Vm, limit: Value, state: Value) -> Outcome {
-    let object = words_of(vm, state)?;
-    let mut generator = RandomState::load(vm, object);
-    let result = match Number::of(&vm.heap, limit) {
+pub fn random(numbers: &mut Numbers<'_>, limit: Value, state: Value) -> NumberResult {
+    let object = words_of(numbers, state)?;
+    let mut generator = RandomState::load(numbers, object);
+    let result = match Number::of(numbers.heap, limit) {
         Some(Number::Float(x)) if x > 0.0 && x.is_finite() => loop {
             let y = (generator.next() >> 11) as f64 / (1u64 << 53) as f64 * x;
             if y < x {
-                break vm.float_value("RANDOM", y)?;
+                break numbers.float_value("RANDOM", y)?;
             }
         },
         Some(Number::Int(n)) if n.signum() > 0 => {
-            vm.exchange.charge(n.len());
+            numbers.charge(n.len());
             let drawn = generator.below(&n);
-            vm.integer_value("RANDOM", &drawn)?
+            numbers.integer_value("RANDOM", &drawn)?
         }
-        _ => return vm.exchange.type_error(limit, "REAL"),
+        _ => return numbers.type_error(limit, "REAL"),
     };
     // The state advances only once no failure is possible.
-    generator.store(vm, object);
+    generator.store(numbers, object);
     Ok(result)
 }
 
 struct RandomState([u64; 4]);
 
 impl RandomState {
-    fn load(vm: &Vm, object: Value) -> RandomState {
-        let words = vm.heap.words(object).unwrap_or_default();
+    fn load(numbers: &Numbers<'_>, object: Value) -> RandomState {
+        let words = numbers.heap.words(object).unwrap_or_default();
         let word = |i: usize| words.get(i).copied().map_or(1, u64::from);
         RandomState([0, 1, 2, 3].map(|i| word(2 * i) | word(2 * i + 1) << 32))
     }
 
-    fn store(&self, vm: &mut Vm, object: Value) {
+    fn store(&self, numbers: &mut Numbers<'_>, object: Value) {
         let words = self.0.iter().flat_map(|&s| [s as u32, (s >> 32) as u32]);
-        for (slot, word) in vm.heap.words_mut(object).unwrap_or_default().iter_mut().zip(words) {
+        for (slot, word) in numbers.heap.words_mut(object).unwrap_or_default().iter_mut().zip(words) {
             *slot = word;
         }
     }

@@ -7,17 +7,15 @@
 
 use std::cmp::Ordering;
 
+use esl_heap::{Heap, Value};
 use num_bigint::{BigInt, BigUint, Sign};
 use num_integer::Integer;
 use num_traits::{Signed, ToPrimitive, Zero};
 use smallvec::SmallVec;
 
-use crate::heap::Heap;
-use crate::value::Value;
-
 /// An integer of any size.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Int {
+pub enum Int {
     /// An integer of at most 127 bits and a sign.
     Small(i128),
     /// A longer one.
@@ -26,12 +24,12 @@ pub(crate) enum Int {
 
 impl Int {
     /// Zero.
-    pub(crate) const ZERO: Int = Int::Small(0);
+    pub const ZERO: Int = Int::Small(0);
     /// One.
-    pub(crate) const ONE: Int = Int::Small(1);
+    pub const ONE: Int = Int::Small(1);
 
     /// Returns the integer that `v` is; `None` for any other value.
-    pub(crate) fn of(heap: &Heap, v: Value) -> Option<Int> {
+    pub fn of(heap: &Heap, v: Value) -> Option<Int> {
         if let Some(n) = v.as_fixnum() {
             return Some(Int::Small(i128::from(n)));
         }
@@ -52,7 +50,7 @@ impl Int {
     }
 
     /// Returns the integer `n` in its one form.
-    pub(crate) fn from_big(n: BigInt) -> Int {
+    pub fn from_big(n: BigInt) -> Int {
         match n.to_i128() {
             Some(small) => Int::Small(small),
             None => Int::Big(n),
@@ -60,7 +58,7 @@ impl Int {
     }
 
     /// Returns the integer as a `BigInt`.
-    pub(crate) fn to_big(&self) -> BigInt {
+    pub fn to_big(&self) -> BigInt {
         match self {
             Int::Small(n) => BigInt::from(*n),
             Int::Big(n) => n.clone(),
@@ -68,7 +66,7 @@ impl Int {
     }
 
     /// Returns the integer with these limbs, least first.
-    pub(crate) fn from_limbs(limbs: &[u64]) -> Int {
+    pub fn from_limbs(limbs: &[u64]) -> Int {
         match *limbs {
             [] => Int::ZERO,
             [low] => Int::Small(i128::from(low)),
@@ -81,7 +79,7 @@ impl Int {
     }
 
     /// Returns whether the integer is negative, and its limbs in the heap's order, least first.
-    pub(crate) fn limbs(&self) -> (bool, SmallVec<[u64; 8]>) {
+    pub fn limbs(&self) -> (bool, SmallVec<[u64; 8]>) {
         match self {
             Int::Small(n) => {
                 let magnitude = n.unsigned_abs();
@@ -92,7 +90,7 @@ impl Int {
     }
 
     /// Returns the fixnum; `None` if the integer does not fit.
-    pub(crate) fn as_fixnum(&self) -> Option<i64> {
+    pub fn as_fixnum(&self) -> Option<i64> {
         match self {
             Int::Small(n) => {
                 i64::try_from(*n).ok().filter(|n| (Value::FIXNUM_MIN..=Value::FIXNUM_MAX).contains(n))
@@ -102,7 +100,7 @@ impl Int {
     }
 
     /// Returns the length of the magnitude in bits; 0 for zero.
-    pub(crate) fn bits(&self) -> u64 {
+    pub fn bits(&self) -> u64 {
         match self {
             Int::Small(n) => u64::from(128 - n.unsigned_abs().leading_zeros()),
             Int::Big(n) => n.bits(),
@@ -110,22 +108,22 @@ impl Int {
     }
 
     /// Returns the length of the magnitude in limbs of 64 bits, at least 1: the unit of work.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         (self.bits() as usize).div_ceil(64).max(1)
     }
 
     /// Returns whether the integer is zero.
-    pub(crate) fn is_zero(&self) -> bool {
+    pub fn is_zero(&self) -> bool {
         matches!(self, Int::Small(0))
     }
 
     /// Returns whether the integer is one.
-    pub(crate) fn is_one(&self) -> bool {
+    pub fn is_one(&self) -> bool {
         matches!(self, Int::Small(1))
     }
 
     /// Returns whether the integer is below zero.
-    pub(crate) fn is_negative(&self) -> bool {
+    pub fn is_negative(&self) -> bool {
         match self {
             Int::Small(n) => *n < 0,
             Int::Big(n) => n.is_negative(),
@@ -133,7 +131,7 @@ impl Int {
     }
 
     /// Returns whether the integer is odd.
-    pub(crate) fn is_odd(&self) -> bool {
+    pub fn is_odd(&self) -> bool {
         match self {
             Int::Small(n) => n & 1 == 1,
             Int::Big(n) => n.is_odd(),
@@ -141,7 +139,7 @@ impl Int {
     }
 
     /// Returns −1, 0 or 1, the sign.
-    pub(crate) fn signum(&self) -> i32 {
+    pub fn signum(&self) -> i32 {
         match self {
             Int::Small(n) => n.signum() as i32,
             Int::Big(n) => {
@@ -155,7 +153,7 @@ impl Int {
     }
 
     /// Returns the integer with the opposite sign.
-    pub(crate) fn negated(&self) -> Int {
+    pub fn negated(&self) -> Int {
         match self {
             Int::Small(n) if let Some(negated) = n.checked_neg() => Int::Small(negated),
             _ => Int::from_big(-self.to_big()),
@@ -163,12 +161,12 @@ impl Int {
     }
 
     /// Returns the magnitude.
-    pub(crate) fn abs(&self) -> Int {
+    pub fn abs(&self) -> Int {
         if self.is_negative() { self.negated() } else { self.clone() }
     }
 
     /// Returns the sum.
-    pub(crate) fn plus(&self, other: &Int) -> Int {
+    pub fn plus(&self, other: &Int) -> Int {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) if let Some(sum) = a.checked_add(*b) => Int::Small(sum),
             (Int::Big(a), Int::Big(b)) => Int::from_big(a + b),
@@ -178,7 +176,7 @@ impl Int {
     }
 
     /// Returns the difference.
-    pub(crate) fn minus(&self, other: &Int) -> Int {
+    pub fn minus(&self, other: &Int) -> Int {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) if let Some(difference) = a.checked_sub(*b) => {
                 Int::Small(difference)
@@ -191,7 +189,7 @@ impl Int {
     }
 
     /// Returns the product.
-    pub(crate) fn times(&self, other: &Int) -> Int {
+    pub fn times(&self, other: &Int) -> Int {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) if let Some(product) = a.checked_mul(*b) => Int::Small(product),
             (Int::Big(a), Int::Big(b)) => Int::from_big(a * b),
@@ -207,7 +205,7 @@ impl Int {
     }
 
     /// Returns the quotient, rounded towards zero, and the remainder. `other` is not zero.
-    pub(crate) fn div_rem(&self, other: &Int) -> (Int, Int) {
+    pub fn div_rem(&self, other: &Int) -> (Int, Int) {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) if let Some(quotient) = a.checked_div(*b) => {
                 (Int::Small(quotient), Int::Small(a.wrapping_rem(*b)))
@@ -220,12 +218,12 @@ impl Int {
     }
 
     /// Returns the quotient of a division without remainder.
-    pub(crate) fn exact_quotient(&self, other: &Int) -> Int {
+    pub fn exact_quotient(&self, other: &Int) -> Int {
         if other.is_one() { self.clone() } else { self.div_rem(other).0 }
     }
 
     /// Returns `self · 2^shift`.
-    pub(crate) fn shifted_left(&self, shift: u64) -> Int {
+    pub fn shifted_left(&self, shift: u64) -> Int {
         match self {
             Int::Small(0) => Int::ZERO,
             Int::Small(n) if self.bits() + shift < 127 => Int::Small(n << shift),
@@ -234,7 +232,7 @@ impl Int {
     }
 
     /// Returns `self / 2^shift`, rounded down.
-    pub(crate) fn shifted_right(&self, shift: u64) -> Int {
+    pub fn shifted_right(&self, shift: u64) -> Int {
         match self {
             Int::Small(n) => Int::Small(n >> shift.min(127)),
             Int::Big(n) if shift > n.bits() => Int::Small(if n.is_negative() { -1 } else { 0 }),
@@ -243,7 +241,7 @@ impl Int {
     }
 
     /// Compares with `other`.
-    pub(crate) fn compare(&self, other: &Int) -> Ordering {
+    pub fn compare(&self, other: &Int) -> Ordering {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) => a.cmp(b),
             (Int::Big(a), Int::Big(b)) => a.cmp(b),
@@ -265,7 +263,7 @@ impl Int {
     }
 
     /// Returns the nearest double, halves to even; infinite on overflow.
-    pub(crate) fn to_f64(&self) -> f64 {
+    pub fn to_f64(&self) -> f64 {
         match self {
             Int::Small(n) => *n as f64,
             Int::Big(n) => {
@@ -280,7 +278,7 @@ impl Int {
     }
 
     /// Returns the integer equal to a finite double without fraction.
-    pub(crate) fn from_f64(x: f64) -> Int {
+    pub fn from_f64(x: f64) -> Int {
         if x.abs() < 2f64.powi(126) {
             return Int::Small(x as i128);
         }
@@ -303,7 +301,7 @@ impl From<BigUint> for Int {
 
 impl Int {
     /// Returns the integer `n`.
-    pub(crate) fn from_unsigned(n: u128) -> Int {
+    pub fn from_unsigned(n: u128) -> Int {
         match i128::try_from(n) {
             Ok(n) => Int::Small(n),
             Err(_) => Int::Big(BigInt::from(n)),

@@ -1,30 +1,29 @@
 //! The tower against known results.
 
 use super::*;
-use crate::raise::Expected;
 
 /// Reads `3`, `-1/2`, `1.5` or `2^70+1` (powers of two make bignums readable).
-fn parse(vm: &mut Vm, text: &str) -> Value {
+fn parse(numbers: &mut Numbers<'_>, text: &str) -> Value {
     if let Some((n, d)) = text.split_once('/') {
-        let (n, d) = (parse(vm, n), parse(vm, d));
-        return divide(vm, n, d).unwrap();
+        let (n, d) = (parse(numbers, n), parse(numbers, d));
+        return divide(numbers, n, d).unwrap();
     }
     if text.contains(['.', 'e']) {
-        return vm.heap.float(text.parse().unwrap()).unwrap();
+        return numbers.heap.float(text.parse().unwrap()).unwrap();
     }
     if let Some((_, rest)) = text.split_once("2^") {
         let split = rest.find(['+', '-']).unwrap_or(rest.len());
         let power = Int::ONE.shifted_left(rest[..split].parse().unwrap());
         let offset = if split < rest.len() { rest[split..].parse::<i64>().unwrap() } else { 0 };
         let sum = power.plus(&Int::from(offset));
-        return vm.integer_value("+", &if text.starts_with('-') { sum.negated() } else { sum }).unwrap();
+        return numbers.integer_value("+", &if text.starts_with('-') { sum.negated() } else { sum }).unwrap();
     }
     let n: num_bigint::BigInt = text.parse().unwrap();
-    vm.integer_value("+", &Int::from_big(n)).unwrap()
+    numbers.integer_value("+", &Int::from_big(n)).unwrap()
 }
 
-fn show(vm: &Vm, v: Value) -> String {
-    match Number::of(&vm.heap, v) {
+fn show(numbers: &Numbers<'_>, v: Value) -> String {
+    match Number::of(numbers.heap, v) {
         Some(Number::Int(n)) => n.to_big().to_string(),
         Some(Number::Ratio(r)) => format!("{}/{}", r.numerator.to_big(), r.denominator.to_big()),
         Some(Number::Float(x)) => format!("{x:?}"),
@@ -32,28 +31,45 @@ fn show(vm: &Vm, v: Value) -> String {
     }
 }
 
+/// One result, or two.
+trait Results {
+    fn all(self) -> Vec<Value>;
+}
+
+impl Results for Value {
+    fn all(self) -> Vec<Value> {
+        vec![self]
+    }
+}
+
+impl Results for [Value; 2] {
+    fn all(self) -> Vec<Value> {
+        self.to_vec()
+    }
+}
+
 /// Applies a function to two numbers.
-fn apply(f: fn(&mut Vm, Value, Value) -> Outcome, a: &str, b: &str) -> String {
-    let mut vm = Vm::for_tests();
-    let (a, b) = (parse(&mut vm, a), parse(&mut vm, b));
-    match f(&mut vm, a, b) {
-        Ok(v) => show(&vm, v),
-        Err(Exit::Values) => {
-            let shown: Vec<String> = vm.exchange.values.iter().map(|&v| show(&vm, v)).collect();
+fn apply<T: Results>(f: fn(&mut Numbers<'_>, Value, Value) -> NumberResult<T>, a: &str, b: &str) -> String {
+    let mut heap = esl_heap_testing::heap();
+    let mut numbers = Numbers::new(&mut heap);
+    let (a, b) = (parse(&mut numbers, a), parse(&mut numbers, b));
+    match f(&mut numbers, a, b) {
+        Ok(results) => {
+            let shown: Vec<String> = results.all().into_iter().map(|v| show(&numbers, v)).collect();
             shown.join(" ")
         }
-        Err(Exit::Raise) => match vm.exchange.raised.take() {
-            Some(Raised::DivisionByZero(..)) => "division-by-zero".into(),
-            Some(Raised::FloatOverflow(_)) => "overflow".into(),
-            Some(Raised::Arithmetic(_, text)) => text,
+        Err(NumberStop::Failed) => match numbers.take_failure() {
+            Some(NumberFailure::DivisionByZero(..)) => "division-by-zero".into(),
+            Some(NumberFailure::FloatOverflow(_)) => "overflow".into(),
+            Some(NumberFailure::Arithmetic(_, text)) => text,
             other => format!("{other:?}"),
         },
-        Err(exit) => format!("{exit:?}"),
+        Err(stop) => format!("{stop:?}"),
     }
 }
 
 #[track_caller]
-fn check(f: fn(&mut Vm, Value, Value) -> Outcome, cases: &[(&str, &str, &str)]) {
+fn check<T: Results>(f: fn(&mut Numbers<'_>, Value, Value) -> NumberResult<T>, cases: &[(&str, &str, &str)]) {
     for (a, b, expected) in cases {
         assert_eq!(apply(f, a, b), *expected, "of {a} and {b}");
     }
@@ -143,10 +159,14 @@ fn quotients() {
 
 #[test]
 fn integer_division_rounds_as_asked() {
-    let floor = |vm: &mut Vm, a, b| rounding::both(vm, Rounding::Floor, a, b);
-    let ceiling = |vm: &mut Vm, a, b| rounding::both(vm, Rounding::Ceiling, a, b);
-    let truncate = |vm: &mut Vm, a, b| rounding::both(vm, Rounding::Truncate, a, b);
-    let round = |vm: &mut Vm, a, b| rounding::both(vm, Rounding::Round, a, b);
+    let floor =
+        |numbers: &mut Numbers<'_>, a: Value, b: Value| rounding::both(numbers, Rounding::Floor, a, b);
+    let ceiling =
+        |numbers: &mut Numbers<'_>, a: Value, b: Value| rounding::both(numbers, Rounding::Ceiling, a, b);
+    let truncate =
+        |numbers: &mut Numbers<'_>, a: Value, b: Value| rounding::both(numbers, Rounding::Truncate, a, b);
+    let round =
+        |numbers: &mut Numbers<'_>, a: Value, b: Value| rounding::both(numbers, Rounding::Round, a, b);
     check(
         floor,
         &[
@@ -215,10 +235,18 @@ fn remainders() {
 
 #[test]
 fn float_quotients_of_ffloor() {
-    let ffloor = |vm: &mut Vm, a, b| rounding::both_with_float(vm, Rounding::Floor, a, b);
-    let ftruncate = |vm: &mut Vm, a, b| rounding::both_with_float(vm, Rounding::Truncate, a, b);
-    let fceiling = |vm: &mut Vm, a, b| rounding::both_with_float(vm, Rounding::Ceiling, a, b);
-    let fround = |vm: &mut Vm, a, b| rounding::both_with_float(vm, Rounding::Round, a, b);
+    let ffloor = |numbers: &mut Numbers<'_>, a: Value, b: Value| {
+        rounding::both_with_float(numbers, Rounding::Floor, a, b)
+    };
+    let ftruncate = |numbers: &mut Numbers<'_>, a: Value, b: Value| {
+        rounding::both_with_float(numbers, Rounding::Truncate, a, b)
+    };
+    let fceiling = |numbers: &mut Numbers<'_>, a: Value, b: Value| {
+        rounding::both_with_float(numbers, Rounding::Ceiling, a, b)
+    };
+    let fround = |numbers: &mut Numbers<'_>, a: Value, b: Value| {
+        rounding::both_with_float(numbers, Rounding::Round, a, b)
+    };
     check(ffloor, &[("7", "2", "3.0 1"), ("-0.5", "1", "-1.0 0.5"), ("7.5", "2", "3.0 1.5")]);
     check(ftruncate, &[("-0.3", "1", "-0.0 -0.3"), ("0.3", "1", "0.0 0.3"), ("1e300", "1", "1e300 0.0")]);
     check(fceiling, &[("-0.3", "1", "-0.0 -0.3")]);
@@ -227,14 +255,15 @@ fn float_quotients_of_ffloor() {
 
 /// Returns the relation of two numbers, from all three comparisons.
 fn relation(a: &str, b: &str) -> &'static str {
-    let mut vm = Vm::for_tests();
-    let (a, b) = (parse(&mut vm, a), parse(&mut vm, b));
+    let mut heap = esl_heap_testing::heap();
+    let mut numbers = Numbers::new(&mut heap);
+    let (a, b) = (parse(&mut numbers, a), parse(&mut numbers, b));
     let (eq, lt, le) = (
-        num_equal(&mut vm, a, b).unwrap(),
-        less(&mut vm, a, b).unwrap(),
-        less_or_equal(&mut vm, a, b).unwrap(),
+        num_equal(&mut numbers, a, b).unwrap(),
+        less(&mut numbers, a, b).unwrap(),
+        less_or_equal(&mut numbers, a, b).unwrap(),
     );
-    let (gt, ge) = (less(&mut vm, b, a).unwrap(), less_or_equal(&mut vm, b, a).unwrap());
+    let (gt, ge) = (less(&mut numbers, b, a).unwrap(), less_or_equal(&mut numbers, b, a).unwrap());
     match (eq, lt, le, gt, ge) {
         (true, false, true, false, true) => "=",
         (false, true, true, false, false) => "<",
@@ -288,26 +317,23 @@ fn eql_tells_types_and_zeros() {
         ("2^80/3", "2^80/3", true),
         ("2^80/3", "2^80/7", false),
     ] {
-        let mut vm = Vm::for_tests();
-        let (x, y) = (parse(&mut vm, a), parse(&mut vm, b));
-        assert_eq!(eql(&vm.heap, x, y), expected, "{a} and {b}");
+        let mut heap = esl_heap_testing::heap();
+        let mut numbers = Numbers::new(&mut heap);
+        let (x, y) = (parse(&mut numbers, a), parse(&mut numbers, b));
+        assert_eq!(eql(numbers.heap, x, y), expected, "{a} and {b}");
     }
 }
 
 #[test]
 fn what_is_no_number_is_named() {
-    let mut vm = Vm::for_tests();
-    for (result, expected) in [
-        (add(&mut vm, Value::T, Value::small(1)), "NUMBER"),
-        (add(&mut vm, Value::small(1), Value::T), "NUMBER"),
-    ] {
-        assert_eq!(result, Err(Exit::Raise));
-        assert!(
-            matches!(vm.exchange.raised, Some(Raised::Type(Value::T, Expected::Type(t))) if t == expected)
-        );
+    let mut heap = esl_heap_testing::heap();
+    let mut numbers = Numbers::new(&mut heap);
+    for (a, b) in [(Value::T, Value::small(1)), (Value::small(1), Value::T)] {
+        assert_eq!(add(&mut numbers, a, b), Err(NumberStop::Failed));
+        assert_eq!(numbers.take_failure(), Some(NumberFailure::Type(Value::T, "NUMBER")));
     }
-    assert_eq!(less(&mut vm, Value::small(1), Value::NIL), Err(Exit::Raise));
-    assert!(matches!(vm.exchange.raised, Some(Raised::Type(Value::NIL, Expected::Type("REAL")))));
+    assert_eq!(less(&mut numbers, Value::small(1), Value::NIL), Err(NumberStop::Failed));
+    assert_eq!(numbers.take_failure(), Some(NumberFailure::Type(Value::NIL, "REAL")));
 }
 
 #[test]
@@ -324,8 +350,9 @@ fn ratios_round_to_the_nearest_double() {
         ("2^1100/2^1099-1", 2.0),
         ("1/2^1022-1", f64::MIN_POSITIVE),
     ] {
-        let mut vm = Vm::for_tests();
-        let v = parse(&mut vm, ratio);
-        assert_eq!(vm.double_of("float", v, "REAL"), Ok(expected), "{ratio}");
+        let mut heap = esl_heap_testing::heap();
+        let mut numbers = Numbers::new(&mut heap);
+        let v = parse(&mut numbers, ratio);
+        assert_eq!(numbers.double_of("float", v, "REAL"), Ok(expected), "{ratio}");
     }
 }

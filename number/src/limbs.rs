@@ -7,12 +7,10 @@
 
 use std::cmp::Ordering;
 
+use esl_heap::{Heap, Value};
 use smallvec::SmallVec;
 
-use crate::heap::Heap;
-use crate::raise::Outcome;
-use crate::value::Value;
-use crate::vm::Vm;
+use super::{NumberResult, Numbers};
 
 /// Limbs of a result; up to 24 stay on the native stack.
 pub(crate) type Limbs = SmallVec<[u64; 24]>;
@@ -198,10 +196,10 @@ fn product(long: &[u64], short: &[u64]) -> Limbs {
     result
 }
 
-impl Vm {
+impl Numbers<'_> {
     /// Returns the integer with this sign and magnitude as a value. Fails as operation `op` if it has too
     /// many bits.
-    pub(crate) fn limbs_value(&mut self, op: &'static str, negative: bool, limbs: &[u64]) -> Outcome {
+    pub fn limbs_value(&mut self, op: &'static str, negative: bool, limbs: &[u64]) -> NumberResult {
         let significant = limbs.iter().rposition(|&limb| limb != 0).map_or(0, |last| last + 1);
         let limbs = &limbs[..significant];
         match *limbs {

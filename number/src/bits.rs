@@ -1,17 +1,16 @@
 //! Bits of integers, as infinite rows of bits in two's complement.
 
+use esl_heap::Value;
 use num_bigint::BigInt;
 use num_traits::Signed;
 
 use super::Int;
 use super::limbs::{BigOperand, Limbs};
-use crate::raise::{Exit, Outcome};
-use crate::value::Value;
-use crate::vm::Vm;
+use super::{NumberResult, Numbers};
 
 /// A bitwise operation on two integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum BitOperation {
+pub enum BitOperation {
     /// Bits set in both.
     And,
     /// Bits set in either.
@@ -21,7 +20,7 @@ pub(crate) enum BitOperation {
 }
 
 /// Returns `a` and `b` joined bit by bit.
-pub(crate) fn join(vm: &mut Vm, operation: BitOperation, a: Value, b: Value) -> Outcome {
+pub fn join(numbers: &mut Numbers<'_>, operation: BitOperation, a: Value, b: Value) -> NumberResult {
     if let (Some(a), Some(b)) = (a.as_fixnum(), b.as_fixnum()) {
         // Fixnums in two's complement are closed under all of these.
         let joined = match operation {
@@ -31,93 +30,93 @@ pub(crate) fn join(vm: &mut Vm, operation: BitOperation, a: Value, b: Value) -> 
         };
         return Ok(Value::fixnum(joined).unwrap_or(Value::NIL));
     }
-    let (a, b) = (vm.integer(a)?, vm.integer(b)?);
-    vm.exchange.charge(a.len() + b.len());
-    vm.integer_value("LOGAND", &a.joined(operation, &b))
+    let (a, b) = (numbers.integer(a)?, numbers.integer(b)?);
+    numbers.charge(a.len() + b.len());
+    numbers.integer_value("LOGAND", &a.joined(operation, &b))
 }
 
 /// Implements `(lognot a)`.
-pub(crate) fn complement(vm: &mut Vm, a: Value) -> Outcome {
-    let a = vm.integer(a)?;
-    vm.exchange.charge(a.len());
-    vm.integer_value("LOGNOT", &a.complement())
+pub fn complement(numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
+    let a = numbers.integer(a)?;
+    numbers.charge(a.len());
+    numbers.integer_value("LOGNOT", &a.complement())
 }
 
 /// Implements `(ash a count)`.
-pub(crate) fn shift(vm: &mut Vm, a: Value, count: Value) -> Outcome {
+pub fn shift(numbers: &mut Numbers<'_>, a: Value, count: Value) -> NumberResult {
     if let Some(distance) = count.as_fixnum()
-        && let Some((bits, is_negative)) = magnitude_bits(vm, a)
+        && let Some((bits, is_negative)) = magnitude_bits(numbers, a)
         && (distance >= 0 || !is_negative)
     {
         let limbs = (bits / 64) as usize;
         if distance > 0 && bits > 0 {
-            vm.check_bits("ASH", bits + distance.unsigned_abs())?;
-            vm.exchange.charge(limbs + distance as usize / 64);
+            numbers.check_bits("ASH", bits + distance.unsigned_abs())?;
+            numbers.charge(limbs + distance as usize / 64);
         } else {
-            vm.exchange.charge(limbs);
+            numbers.charge(limbs);
         }
-        let shifted = BigOperand::of(&vm.heap, a, &mut [0]).map(|n| match u64::try_from(distance) {
+        let shifted = BigOperand::of(numbers.heap, a, &mut [0]).map(|n| match u64::try_from(distance) {
             Ok(shift) if bits > 0 => n.shifted_left(shift),
             Ok(_) => Limbs::new(),
             Err(_) => n.field(distance.unsigned_abs(), u64::MAX),
         });
-        return vm.limbs_value("ASH", is_negative, &shifted.unwrap_or_default());
+        return numbers.limbs_value("ASH", is_negative, &shifted.unwrap_or_default());
     }
-    let (n, count) = (vm.integer(a)?, vm.integer(count)?);
-    vm.exchange.charge(n.len());
+    let (n, count) = (numbers.integer(a)?, numbers.integer(count)?);
+    numbers.charge(n.len());
     if n.is_zero() {
         return Ok(a);
     }
     if count.is_negative() {
         let shift = u64::try_from(count.negated().to_big()).unwrap_or(u64::MAX);
-        return vm.integer_value("ASH", &n.shifted_right(shift));
+        return numbers.integer_value("ASH", &n.shifted_right(shift));
     }
     // A count beyond 64 bits exceeds the limit in any case.
     let shift = u64::try_from(count.to_big()).unwrap_or(u64::MAX >> 1).min(u64::MAX >> 1);
-    vm.check_bits("ASH", n.bits() + shift)?;
-    vm.exchange.charge(shift as usize / 64);
-    vm.integer_value("ASH", &n.shifted_left(shift))
+    numbers.check_bits("ASH", n.bits() + shift)?;
+    numbers.charge(shift as usize / 64);
+    numbers.integer_value("ASH", &n.shifted_left(shift))
 }
 
 /// Implements `(logbitp index a)`: an index past the last bit sees the sign.
-pub(crate) fn bit(vm: &mut Vm, index: Value, a: Value) -> Result<bool, Exit> {
-    let n = vm.integer(a)?;
-    match Int::of(&vm.heap, index) {
+pub fn bit(numbers: &mut Numbers<'_>, index: Value, a: Value) -> NumberResult<bool> {
+    let n = numbers.integer(a)?;
+    match Int::of(numbers.heap, index) {
         Some(index) if !index.is_negative() => Ok(match u64::try_from(index.to_big()) {
             Ok(index) => n.bit(index),
             Err(_) => n.is_negative(),
         }),
-        _ => vm.exchange.type_error(index, "UNSIGNED-BYTE"),
+        _ => numbers.type_error(index, "UNSIGNED-BYTE"),
     }
 }
 
 /// Returns the length of the magnitude of an integer in bits, and whether the integer is negative. `None` for
 /// any other value.
-fn magnitude_bits(vm: &Vm, v: Value) -> Option<(u64, bool)> {
-    BigOperand::of(&vm.heap, v, &mut [0]).map(|n| (n.bits(), n.is_negative()))
+fn magnitude_bits(numbers: &Numbers<'_>, v: Value) -> Option<(u64, bool)> {
+    BigOperand::of(numbers.heap, v, &mut [0]).map(|n| (n.bits(), n.is_negative()))
 }
 
 /// Returns `size` bits of `a` from bit `position` up, as an integer that is not negative.
-pub(crate) fn field(vm: &mut Vm, size: u64, position: u64, a: Value) -> Outcome {
-    if let Some((bits, false)) = magnitude_bits(vm, a) {
-        vm.exchange.charge((size.min(bits) / 64) as usize);
-        let field = BigOperand::of(&vm.heap, a, &mut [0]).map(|n| n.field(position, size));
-        return vm.limbs_value("LDB", false, &field.unwrap_or_default());
+pub fn field(numbers: &mut Numbers<'_>, size: u64, position: u64, a: Value) -> NumberResult {
+    if let Some((bits, false)) = magnitude_bits(numbers, a) {
+        numbers.charge((size.min(bits) / 64) as usize);
+        let field = BigOperand::of(numbers.heap, a, &mut [0]).map(|n| n.field(position, size));
+        return numbers.limbs_value("LDB", false, &field.unwrap_or_default());
     }
-    let n = vm.integer(a)?;
-    vm.check_bits("LDB", size)?;
-    vm.exchange.charge(n.len() + size as usize / 64);
+    let n = numbers.integer(a)?;
+    numbers.check_bits("LDB", size)?;
+    numbers.charge(n.len() + size as usize / 64);
     let field = n.shifted_right(position).joined(BitOperation::And, &mask(size));
-    vm.integer_value("LDB", &field)
+    numbers.integer_value("LDB", &field)
 }
 
 /// Returns `a` with the field of `size` bits from `position` up replaced by the lowest bits of `new`.
-pub(crate) fn deposit(vm: &mut Vm, new: &Int, size: u64, position: u64, a: &Int) -> Result<Int, Exit> {
+pub fn deposit(numbers: &mut Numbers<'_>, new: &Int, size: u64, position: u64, a: &Int) -> NumberResult<Int> {
     if size == 0 {
         return Ok(a.clone());
     }
-    vm.check_bits("DPB", size.saturating_add(position))?;
-    vm.exchange.charge(a.len() + (size + position) as usize / 64);
+    numbers.check_bits("DPB", size.saturating_add(position))?;
+    numbers.charge(a.len() + (size + position) as usize / 64);
     let mask = mask(size);
     let kept = a.joined(BitOperation::And, &mask.shifted_left(position).complement());
     let placed = new.joined(BitOperation::And, &mask).shifted_left(position);
@@ -131,7 +130,7 @@ fn mask(size: u64) -> Int {
 
 impl Int {
     /// Returns both integers joined bit by bit.
-    pub(crate) fn joined(&self, operation: BitOperation, other: &Int) -> Int {
+    pub fn joined(&self, operation: BitOperation, other: &Int) -> Int {
         if let (Int::Small(a), Int::Small(b)) = (self, other) {
             return Int::Small(match operation {
                 BitOperation::And => a & b,
@@ -148,7 +147,7 @@ impl Int {
     }
 
     /// Returns the integer with all bits inverted: `-1 - self`.
-    pub(crate) fn complement(&self) -> Int {
+    pub fn complement(&self) -> Int {
         match self {
             Int::Small(n) => Int::Small(!n),
             Int::Big(n) => Int::from_big(-BigInt::from(1) - n),
@@ -156,7 +155,7 @@ impl Int {
     }
 
     /// Returns the bit at `index`.
-    pub(crate) fn bit(&self, index: u64) -> bool {
+    pub fn bit(&self, index: u64) -> bool {
         match self {
             Int::Small(n) => n >> index.min(127) & 1 == 1,
             Int::Big(n) => n.bit(index),
@@ -164,7 +163,7 @@ impl Int {
     }
 
     /// Returns the number of ones of an integer that is not negative, of zeros of a negative one.
-    pub(crate) fn count_bits(&self) -> u64 {
+    pub fn count_bits(&self) -> u64 {
         let ones = |n: &BigInt| n.iter_u64_digits().map(|limb| u64::from(limb.count_ones())).sum();
         match self {
             Int::Small(n) => u64::from(if *n < 0 { n.count_zeros() } else { n.count_ones() }),
@@ -174,7 +173,7 @@ impl Int {
     }
 
     /// Returns the length in two's complement, in bits, without the sign.
-    pub(crate) fn length(&self) -> u64 {
+    pub fn length(&self) -> u64 {
         if self.is_negative() { self.complement().bits() } else { self.bits() }
     }
 }

@@ -2,20 +2,20 @@
 //!
 //! Here are names, domains and failures; the computation is in `transcendental`.
 
+use esl_heap::Value;
+
 use super::transcendental;
-use crate::raise::{Exit, Outcome, Raised};
-use crate::value::Value;
-use crate::vm::Vm;
+use super::{NumberFailure, NumberResult, NumberStop, Numbers};
 
 /// A function of one double.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Elementary {
+pub struct Elementary {
     /// Name in `COMMON-LISP`.
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     /// The function itself.
-    pub(crate) function: fn(f64) -> f64,
+    pub function: fn(f64) -> f64,
     /// Whether the result is real for this argument.
-    pub(crate) domain: fn(f64) -> bool,
+    pub domain: fn(f64) -> bool,
 }
 
 fn everywhere(_: f64) -> bool {
@@ -29,7 +29,8 @@ fn within_one(x: f64) -> bool {
 macro_rules! elementary {
     ($( $id:ident = $name:literal $function:path, $domain:expr; )*) => {
         $(
-            pub(crate) const $id: Elementary =
+            #[doc = concat!("The function `", $name, "`.")]
+            pub const $id: Elementary =
                 Elementary { name: $name, function: $function, domain: $domain };
         )*
     };
@@ -52,22 +53,22 @@ elementary! {
 
 impl Elementary {
     /// Applies the function to `a`.
-    pub(crate) fn apply(&self, vm: &mut Vm, a: Value) -> Outcome {
-        let x = vm.double_of(self.name, a, "NUMBER")?;
+    pub fn apply(&self, numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
+        let x = numbers.double_of(self.name, a, "NUMBER")?;
         if !(self.domain)(x) {
             // The result is complex.
-            return Err(Exit::Slowly);
+            return Err(NumberStop::Slowly);
         }
         let y = (self.function)(x);
         if y.is_infinite() && x.abs() == 1.0 {
-            return vm.exchange.raise(Raised::DivisionByZero(self.name, [a, Value::small(0)]));
+            return numbers.fail(NumberFailure::DivisionByZero(self.name, [a, Value::small(0)]));
         }
-        vm.float_value(self.name, y)
+        numbers.float_value(self.name, y)
     }
 }
 
 /// Implements `(atan y x)`: the angle of the point with these coordinates.
-pub(crate) fn angle(vm: &mut Vm, y: Value, x: Value) -> Outcome {
-    let (y, x) = (vm.double_of("ATAN", y, "REAL")?, vm.double_of("ATAN", x, "REAL")?);
-    vm.float_value("ATAN", transcendental::atan2(y, x))
+pub fn angle(numbers: &mut Numbers<'_>, y: Value, x: Value) -> NumberResult {
+    let (y, x) = (numbers.double_of("ATAN", y, "REAL")?, numbers.double_of("ATAN", x, "REAL")?);
+    numbers.float_value("ATAN", transcendental::atan2(y, x))
 }

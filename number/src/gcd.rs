@@ -10,13 +10,13 @@ use num_bigint::BigUint;
 use super::Int;
 
 /// Returns the greatest common divisor, which is not negative.
-pub(crate) fn gcd(a: &Int, b: &Int) -> Int {
+pub fn gcd(a: &Int, b: &Int) -> Int {
     reduced(a, b, usize::MAX).0
 }
 
 /// Returns two smaller numbers with the same greatest common divisor as `a` and `b`, after at most `steps`
 /// steps. When the second is zero, the first is the divisor. Neither is negative.
-pub(crate) fn reduced(a: &Int, b: &Int, steps: usize) -> (Int, Int) {
+pub fn reduced(a: &Int, b: &Int, steps: usize) -> (Int, Int) {
     if let (Int::Small(a), Int::Small(b)) = (a, b) {
         return (Int::from_unsigned(small_gcd(a.unsigned_abs(), b.unsigned_abs())), Int::ZERO);
     }
@@ -47,7 +47,7 @@ pub(crate) fn reduced(a: &Int, b: &Int, steps: usize) -> (Int, Int) {
 }
 
 /// Returns how many steps of reduction of numbers of `limbs` limbs stay within the limit of work of one call.
-pub(crate) fn steps_within_limit(limbs: usize) -> usize {
+pub fn steps_within_limit(limbs: usize) -> usize {
     (super::limit::WORK_LIMIT / (8 * limbs)).max(1)
 }
 

@@ -4,7 +4,7 @@ use super::{Int, Ratio};
 
 /// Returns the double nearest to `mantissa · 2^exponent`, halves to even: infinite on overflow, and exact
 /// about denormalized numbers. If `mantissa` has 66 bits or more, its last bit may say that more bits follow.
-pub(crate) fn rounded(mantissa: u128, exponent: i64) -> f64 {
+pub fn rounded(mantissa: u128, exponent: i64) -> f64 {
     if mantissa == 0 {
         return 0.0;
     }
@@ -30,7 +30,7 @@ pub(crate) fn rounded(mantissa: u128, exponent: i64) -> f64 {
 }
 
 /// Returns mantissa (with the sign) and exponent of a finite double: `x = mantissa · 2^exponent`, exactly.
-pub(crate) fn decode(x: f64) -> (i64, i32) {
+pub fn decode(x: f64) -> (i64, i32) {
     let bits = x.to_bits();
     let fraction = (bits & ((1 << 52) - 1)) as i64;
     let biased = (bits >> 52 & 0x7FF) as i32;
@@ -40,7 +40,7 @@ pub(crate) fn decode(x: f64) -> (i64, i32) {
 }
 
 /// Returns the rational with exactly the value of a finite double.
-pub(crate) fn rational(x: f64) -> Ratio {
+pub fn rational(x: f64) -> Ratio {
     let (mantissa, exponent) = decode(x);
     if mantissa == 0 || exponent >= 0 {
         return Ratio::integer(Int::from(mantissa).shifted_left(u64::try_from(exponent).unwrap_or(0)));
@@ -54,7 +54,7 @@ pub(crate) fn rational(x: f64) -> Ratio {
 
 /// Returns the simplest rational that reads as the finite double `x`: the one with the least denominator in
 /// the interval that rounds to `x`.
-pub(crate) fn rationalize(x: f64) -> Ratio {
+pub fn rationalize(x: f64) -> Ratio {
     let (mantissa, exponent) = decode(x);
     if exponent >= 0 || mantissa == 0 {
         return rational(x);
@@ -94,11 +94,11 @@ fn simplest_between(low: Ratio, high: Ratio) -> Ratio {
 }
 
 /// Returns `x · 2^exponent`, rounded once.
-pub(crate) fn scaled(x: f64, exponent: i64) -> f64 {
+pub fn scaled(x: f64, exponent: i64) -> f64 {
     libm::scalbn(x, exponent.clamp(-5000, 5000) as i32)
 }
 
 /// Returns the fraction of a finite double, from 1/2 to below 1 without the sign, and its exponent.
-pub(crate) fn fraction_and_exponent(x: f64) -> (f64, i32) {
+pub fn fraction_and_exponent(x: f64) -> (f64, i32) {
     libm::frexp(x.abs())
 }

@@ -6,40 +6,39 @@
 //! 16,384 digits 270; a root of 512 limbs 350. The limits are half of these sizes, so that quadratic work
 //! takes about a quarter of the time: other tasks wait for the longest step.
 
-use crate::raise::{Exit, Raised};
-use crate::vm::Vm;
+use super::{NumberFailure, NumberResult, NumberStop, Numbers};
 
 /// Greatest size of an integer, in bits.
-pub(crate) const BIT_LIMIT: u64 = 1 << 22;
+pub const BIT_LIMIT: u64 = 1 << 22;
 
 /// Greatest product of the operands' lengths in one multiplication, in pairs of limbs. A division counts
 /// double.
-pub(crate) const WORK_LIMIT: usize = 1 << 19;
+pub const WORK_LIMIT: usize = 1 << 19;
 
 /// Greatest length, in limbs, of the operands of a greatest common divisor and of the parts of ratios in one
 /// operation.
-pub(crate) const GCD_LIMBS: usize = 128;
+pub const GCD_LIMBS: usize = 128;
 
 /// Greatest length, in limbs, of an integer whose root is taken in one operation.
-pub(crate) const ROOT_LIMBS: usize = 256;
+pub const ROOT_LIMBS: usize = 256;
 
 /// Greatest length, in limbs, of an integer written in one operation in a radix that is not a power of two.
-pub(crate) const DIGIT_LIMBS: usize = 512;
+pub const DIGIT_LIMBS: usize = 512;
 
 /// Greatest number of digits written in one operation in a radix that is a power of two, which takes linear
 /// time.
-pub(crate) const WRITTEN_DIGITS: u64 = 1 << 17;
+pub const WRITTEN_DIGITS: u64 = 1 << 17;
 
 /// Greatest number of digits read in one operation.
-pub(crate) const PARSED_DIGITS: usize = 8192;
+pub const PARSED_DIGITS: usize = 8192;
 
-impl Vm {
+impl Numbers<'_> {
     /// Fails as operation `op` if an integer of `bits` bits is too large.
-    pub(crate) fn check_bits(&mut self, op: &'static str, bits: u64) -> Result<(), Exit> {
+    pub fn check_bits(&mut self, op: &'static str, bits: u64) -> NumberResult<()> {
         if bits <= BIT_LIMIT {
             return Ok(());
         }
-        self.exchange.raise(Raised::Arithmetic(
+        self.fail(NumberFailure::Arithmetic(
             op,
             format!("the result would have {bits} bits, the limit is {BIT_LIMIT}"),
         ))
@@ -48,13 +47,13 @@ impl Vm {
     /// Charges for work on `a` by `b` limbs.
     ///
     /// # Errors
-    /// [`Exit::Slowly`] if that is too much for one operation.
-    pub(crate) fn check_work(&mut self, a: usize, b: usize) -> Result<(), Exit> {
+    /// [`NumberStop::Slowly`] if that is too much for one operation.
+    pub fn check_work(&mut self, a: usize, b: usize) -> NumberResult<()> {
         let work = a.saturating_mul(b);
         if work > WORK_LIMIT {
-            return Err(Exit::Slowly);
+            return Err(NumberStop::Slowly);
         }
-        self.exchange.charge(work);
+        self.charge(work);
         Ok(())
     }
 }

@@ -39,18 +39,18 @@ fn ratio(x: &BigRational) -> Ratio {
     Ratio { numerator: Int::from_big(x.numer().clone()), denominator: Int::from_big(x.denom().clone()) }
 }
 
-fn value(vm: &mut Vm, x: &BigRational) -> Value {
-    vm.ratio_value("", &ratio(x)).unwrap()
+fn value(numbers: &mut Numbers<'_>, x: &BigRational) -> Value {
+    numbers.ratio_value("", &ratio(x)).unwrap()
 }
 
 /// Returns the rational that a value is, checked to be in its one representation.
-fn rational_of(vm: &Vm, v: Value) -> BigRational {
+fn rational_of(numbers: &Numbers<'_>, v: Value) -> BigRational {
     let integer = |v: Value| {
-        let n = Int::of(&vm.heap, v).unwrap();
+        let n = Int::of(numbers.heap, v).unwrap();
         assert_eq!(v.is_fixnum(), n.as_fixnum().is_some(), "what fits is a fixnum");
         n.to_big()
     };
-    match vm.heap.ratio(v) {
+    match numbers.heap.ratio(v) {
         Some((numerator, denominator)) => {
             let (n, d) = (integer(numerator), integer(denominator));
             let reduced = BigRational::new(n.clone(), d.clone());
@@ -68,31 +68,33 @@ fn floor(x: &BigRational) -> BigRational {
 proptest! {
     #[test]
     fn arithmetic_is_exact(a in rational(), b in rational()) {
-        let mut vm = Vm::for_tests();
-        let (x, y) = (value(&mut vm, &a), value(&mut vm, &b));
-        let sum = add(&mut vm, x, y).unwrap();
-        prop_assert_eq!(rational_of(&vm, sum), &a + &b);
-        let difference = subtract(&mut vm, x, y).unwrap();
-        prop_assert_eq!(rational_of(&vm, difference), &a - &b);
-        let product = multiply(&mut vm, x, y).unwrap();
-        prop_assert_eq!(rational_of(&vm, product), &a * &b);
-        let negative = negate(&mut vm, x).unwrap();
-        prop_assert_eq!(rational_of(&vm, negative), -a.clone());
-        match divide(&mut vm, x, y) {
-            Ok(quotient) => prop_assert_eq!(rational_of(&vm, quotient), &a / &b),
+        let mut heap = esl_heap_testing::heap();
+        let mut numbers = Numbers::new(&mut heap);
+        let (x, y) = (value(&mut numbers, &a), value(&mut numbers, &b));
+        let sum = add(&mut numbers, x, y).unwrap();
+        prop_assert_eq!(rational_of(&numbers, sum), &a + &b);
+        let difference = subtract(&mut numbers, x, y).unwrap();
+        prop_assert_eq!(rational_of(&numbers, difference), &a - &b);
+        let product = multiply(&mut numbers, x, y).unwrap();
+        prop_assert_eq!(rational_of(&numbers, product), &a * &b);
+        let negative = negate(&mut numbers, x).unwrap();
+        prop_assert_eq!(rational_of(&numbers, negative), -a.clone());
+        match divide(&mut numbers, x, y) {
+            Ok(quotient) => prop_assert_eq!(rational_of(&numbers, quotient), &a / &b),
             Err(_) => prop_assert!(b.is_zero()),
         }
-        prop_assert_eq!(less(&mut vm, x, y).unwrap(), a < b);
-        prop_assert_eq!(less_or_equal(&mut vm, x, y).unwrap(), a <= b);
-        prop_assert_eq!(num_equal(&mut vm, x, y).unwrap(), a == b);
-        prop_assert_eq!(eql(&vm.heap, x, y), a == b);
+        prop_assert_eq!(less(&mut numbers, x, y).unwrap(), a < b);
+        prop_assert_eq!(less_or_equal(&mut numbers, x, y).unwrap(), a <= b);
+        prop_assert_eq!(num_equal(&mut numbers, x, y).unwrap(), a == b);
+        prop_assert_eq!(eql(numbers.heap, x, y), a == b);
     }
 
     #[test]
     fn division_rounds_as_defined(a in rational(), b in rational()) {
         prop_assume!(!b.is_zero());
-        let mut vm = Vm::for_tests();
-        let (x, y) = (value(&mut vm, &a), value(&mut vm, &b));
+        let mut heap = esl_heap_testing::heap();
+        let mut numbers = Numbers::new(&mut heap);
+        let (x, y) = (value(&mut numbers, &a), value(&mut numbers, &b));
         let exact = &a / &b;
         let half = BigRational::new(1.into(), 2.into());
         for rounding in [Rounding::Floor, Rounding::Ceiling, Rounding::Truncate, Rounding::Round] {
@@ -107,28 +109,28 @@ proptest! {
                     if is_tie && is_odd { low - BigRational::from(BigInt::from(1)) } else { low }
                 }
             };
-            prop_assert_eq!(rounding::both(&mut vm, rounding, x, y), Err(Exit::Values));
-            let (quotient, remainder) = (vm.exchange.values[0], vm.exchange.values[1]);
-            prop_assert_eq!(rational_of(&vm, quotient), expected.clone());
-            prop_assert_eq!(rational_of(&vm, remainder), &a - &expected * &b);
+            let [quotient, remainder] = rounding::both(&mut numbers, rounding, x, y).unwrap();
+            prop_assert_eq!(rational_of(&numbers, quotient), expected.clone());
+            prop_assert_eq!(rational_of(&numbers, remainder), &a - &expected * &b);
         }
     }
 
     #[test]
     fn bits_are_those_of_twos_complement(a in integer(), b in integer(), shift in -300i64..300) {
-        let mut vm = Vm::for_tests();
-        let (x, y) = (value(&mut vm, &a.clone().into()), value(&mut vm, &b.clone().into()));
+        let mut heap = esl_heap_testing::heap();
+        let mut numbers = Numbers::new(&mut heap);
+        let (x, y) = (value(&mut numbers, &a.clone().into()), value(&mut numbers, &b.clone().into()));
         for (operation, expected) in [
             (bits::BitOperation::And, &a & &b),
             (bits::BitOperation::Or, &a | &b),
             (bits::BitOperation::Xor, &a ^ &b),
         ] {
-            let joined = bits::join(&mut vm, operation, x, y).unwrap();
-            prop_assert_eq!(rational_of(&vm, joined), BigRational::from(expected));
+            let joined = bits::join(&mut numbers, operation, x, y).unwrap();
+            prop_assert_eq!(rational_of(&numbers, joined), BigRational::from(expected));
         }
-        let shifted = bits::shift(&mut vm, x, Value::fixnum(shift).unwrap()).unwrap();
+        let shifted = bits::shift(&mut numbers, x, Value::fixnum(shift).unwrap()).unwrap();
         let power = BigRational::from(BigInt::from(2)).pow(shift as i32);
-        prop_assert_eq!(rational_of(&vm, shifted), floor(&(BigRational::from(a.clone()) * power)));
+        prop_assert_eq!(rational_of(&numbers, shifted), floor(&(BigRational::from(a.clone()) * power)));
         let n = Int::from_big(a.clone());
         let two = BigInt::from(2);
         let length = n.length() as u32;
@@ -140,15 +142,16 @@ proptest! {
 
     #[test]
     fn doubles_and_rationals_meet_exactly(x in finite(), a in rational()) {
-        let mut vm = Vm::for_tests();
+        let mut heap = esl_heap_testing::heap();
+        let mut numbers = Numbers::new(&mut heap);
         let exact = BigRational::from_float(x).unwrap();
-        let (v, r) = (vm.heap.float(x).unwrap(), value(&mut vm, &a));
-        prop_assert_eq!(less(&mut vm, v, r).unwrap(), exact < a);
-        prop_assert_eq!(less(&mut vm, r, v).unwrap(), a < exact);
-        prop_assert_eq!(num_equal(&mut vm, v, r).unwrap(), exact == a);
-        let same = vm.ratio_value("", &float::rational(x)).unwrap();
-        prop_assert_eq!(rational_of(&vm, same), exact.clone());
-        prop_assert!(num_equal(&mut vm, v, same).unwrap());
+        let (v, r) = (numbers.heap.float(x).unwrap(), value(&mut numbers, &a));
+        prop_assert_eq!(less(&mut numbers, v, r).unwrap(), exact < a);
+        prop_assert_eq!(less(&mut numbers, r, v).unwrap(), a < exact);
+        prop_assert_eq!(num_equal(&mut numbers, v, r).unwrap(), exact == a);
+        let same = numbers.ratio_value("", &float::rational(x)).unwrap();
+        prop_assert_eq!(rational_of(&numbers, same), exact.clone());
+        prop_assert!(num_equal(&mut numbers, v, same).unwrap());
         // The simplest rational has at most the exact one's denominator, and rounds to the same double.
         let simple = float::rationalize(x);
         prop_assert!(simple.denominator.to_big() <= *exact.denom());
@@ -178,8 +181,9 @@ proptest! {
         let is_positional = !written.contains('e');
         prop_assert_eq!(is_positional, x == 0.0 || (1e-3..1e7).contains(&x.abs()));
         prop_assert!(written.contains('.') && !written.ends_with('.'));
-        let mut vm = Vm::for_tests();
-        let digits = text::integer_text(&mut vm, &Int::from_big(a.clone()), radix).unwrap();
+        let mut heap = esl_heap_testing::heap();
+        let mut numbers = Numbers::new(&mut heap);
+        let digits = text::integer_text(&mut numbers, &Int::from_big(a.clone()), radix).unwrap();
         let characters: Vec<u32> = format!("  {digits} ").chars().map(|c| c as u32).collect();
         let end = characters.len() - 1;
         let parsed = text::parse_integer(&characters, 0, radix);

@@ -7,37 +7,35 @@ use num_bigint::{BigInt, BigUint};
 use num_integer::Integer;
 use num_traits::{Pow, Zero};
 
-use super::{Int, float, limit};
-use crate::raise::Exit;
-use crate::vm::Vm;
+use super::{Int, NumberResult, NumberStop, Numbers, float, limit};
 
 /// Returns the digits of `n` in `radix`, from 2 to 36, with `-` in front of a negative number.
 ///
 /// # Errors
-/// [`Exit::Slowly`] for a number above [`limit::DIGIT_LIMBS`] in a radix that is not a power of two, or with
-/// more than about [`limit::WRITTEN_DIGITS`] digits.
-pub(crate) fn integer_text(vm: &mut Vm, n: &Int, radix: u32) -> Result<String, Exit> {
+/// [`NumberStop::Slowly`] for a number above [`limit::DIGIT_LIMBS`] in a radix that is not a power of two, or
+/// with more than about [`limit::WRITTEN_DIGITS`] digits.
+pub fn integer_text(numbers: &mut Numbers<'_>, n: &Int, radix: u32) -> NumberResult<String> {
     match n {
         Int::Small(n) if radix == 10 => Ok(n.to_string()),
         _ => {
             let len = n.len();
             if n.bits() / u64::from(radix.ilog2()) > limit::WRITTEN_DIGITS {
-                return Err(Exit::Slowly);
+                return Err(NumberStop::Slowly);
             }
             if !radix.is_power_of_two() {
                 if len > limit::DIGIT_LIMBS {
-                    return Err(Exit::Slowly);
+                    return Err(NumberStop::Slowly);
                 }
-                vm.exchange.charge(len * len);
+                numbers.charge(len * len);
             }
-            vm.exchange.charge(64 * len);
+            numbers.charge(64 * len);
             Ok(n.to_big().to_str_radix(radix).to_uppercase())
         }
     }
 }
 
 /// Returns a double as `prin1` writes it: positional from 1e-3 to below 1e7, else with an exponent.
-pub(crate) fn float_text(x: f64) -> String {
+pub fn float_text(x: f64) -> String {
     if x.is_nan() {
         return "#<FLOAT NAN>".into();
     }
@@ -76,7 +74,7 @@ fn scientific(x: f64) -> (String, i32) {
 ///
 /// Source: Burger and Dybvig, "Printing floating-point numbers quickly and accurately", 1996, with the cutoff
 /// of SBCL's `flonum-to-digits`, whose every choice is kept.
-pub(crate) fn float_digits(x: f64, position: Option<i32>) -> (i32, String) {
+pub fn float_digits(x: f64, position: Option<i32>) -> (i32, String) {
     let Some(position) = position else {
         if x == 0.0 {
             return (0, "0".into());
@@ -154,7 +152,7 @@ fn scale_and_generate(mut r: BigUint, mut s: BigUint, mut low: BigUint, mut high
 
 /// The result of reading an integer.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Parsed {
+pub enum Parsed {
     /// An integer, and the index after its last digit.
     Integer(Int, usize),
     /// No digit where one is expected; the index of the character there.
@@ -164,7 +162,7 @@ pub(crate) enum Parsed {
 }
 
 /// Reads an integer in `radix` from the characters from `start` on: white space, a sign, digits.
-pub(crate) fn parse_integer(characters: &[u32], start: usize, radix: u32) -> Parsed {
+pub fn parse_integer(characters: &[u32], start: usize, radix: u32) -> Parsed {
     let character = |at: usize| characters.get(at).copied().and_then(char::from_u32);
     let mut at = start;
     while characters.get(at).copied().is_some_and(is_blank) {
@@ -201,6 +199,6 @@ pub(crate) fn parse_integer(characters: &[u32], start: usize, radix: u32) -> Par
 }
 
 /// Returns whether `parse-integer` skips the character.
-pub(crate) fn is_blank(code: u32) -> bool {
+pub fn is_blank(code: u32) -> bool {
     matches!(code, 0x20 | 0x08..=0x0D | 0xA0)
 }

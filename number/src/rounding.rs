@@ -5,15 +5,14 @@
 
 use std::cmp::Ordering;
 
+use esl_heap::Value;
+
 use super::arithmetic::{Pair, check_ratios, typed_operands};
-use super::{Int, Ratio};
-use crate::raise::{Exit, Outcome, Raised};
-use crate::value::Value;
-use crate::vm::Vm;
+use super::{Int, NumberFailure, NumberResult, Numbers, Ratio};
 
 /// The choice of an integer near a quotient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Rounding {
+pub enum Rounding {
     /// The greatest integer not above it.
     Floor,
     /// The least integer not below it.
@@ -67,60 +66,65 @@ impl Division {
 }
 
 /// Returns the remainder of `floor`.
-pub(crate) fn modulo(vm: &mut Vm, a: Value, b: Value) -> Outcome {
-    rest(vm, Rounding::Floor, a, b)
+pub fn modulo(numbers: &mut Numbers<'_>, a: Value, b: Value) -> NumberResult {
+    rest(numbers, Rounding::Floor, a, b)
 }
 
 /// Returns the remainder of `truncate`.
-pub(crate) fn remainder(vm: &mut Vm, a: Value, b: Value) -> Outcome {
-    rest(vm, Rounding::Truncate, a, b)
+pub fn remainder(numbers: &mut Numbers<'_>, a: Value, b: Value) -> NumberResult {
+    rest(numbers, Rounding::Truncate, a, b)
 }
 
-/// Returns quotient and remainder, as two values.
-pub(crate) fn both(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
+/// Returns quotient and remainder.
+pub fn both(numbers: &mut Numbers<'_>, rounding: Rounding, a: Value, b: Value) -> NumberResult<[Value; 2]> {
     let division = match small(rounding, a, b) {
         Some((quotient, remainder)) => Division::Ints(quotient, remainder),
-        None => division(vm, rounding, a, b)?,
+        None => division(numbers, rounding, a, b)?,
     };
-    let quotient = vm.integer_value("/", division.quotient())?;
-    let remainder = remainder_value(vm, division)?;
-    vm.give_values(&[quotient, remainder])
+    let quotient = numbers.integer_value("/", division.quotient())?;
+    let remainder = remainder_value(numbers, division)?;
+    Ok([quotient, remainder])
 }
 
 /// Returns the quotient as a float, and the remainder: `ffloor` and its family.
 ///
 /// The quotient of floats may be minus zero, but for `fround`, whose quotient is that of `round`.
-pub(crate) fn both_with_float(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
-    let (quotient, remainder) = match real_operands(vm, a, b)? {
+pub fn both_with_float(
+    numbers: &mut Numbers<'_>,
+    rounding: Rounding,
+    a: Value,
+    b: Value,
+) -> NumberResult<[Value; 2]> {
+    let (quotient, remainder) = match real_operands(numbers, a, b)? {
         Pair::Floats(x, y) if rounding != Rounding::Round => {
-            let whole = float_quotient(vm, [a, b], x, y)?.trunc();
+            let whole = float_quotient(numbers, [a, b], x, y)?.trunc();
             let (step, remainder) = float_remainder(rounding, x, y, whole);
             // A zero added would take the sign of minus zero away.
             let quotient = if step == 0 { whole } else { whole + f64::from(step) };
-            (quotient, vm.float_value("/", remainder)?)
+            (quotient, numbers.float_value("/", remainder)?)
         }
         operands => {
-            let division = divide(vm, rounding, [a, b], operands)?;
-            (division.quotient().to_f64(), remainder_value(vm, division)?)
+            let division = divide(numbers, rounding, [a, b], operands)?;
+            (division.quotient().to_f64(), remainder_value(numbers, division)?)
         }
     };
-    let quotient = vm.float_value("/", quotient)?;
-    vm.give_values(&[quotient, remainder])
+    let quotient = numbers.float_value("/", quotient)?;
+    Ok([quotient, remainder])
 }
 
-fn rest(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
+fn rest(numbers: &mut Numbers<'_>, rounding: Rounding, a: Value, b: Value) -> NumberResult {
     if let Some((_, remainder)) = small(rounding, a, b) {
-        return vm.integer_value("/", &remainder);
+        return numbers.integer_value("/", &remainder);
     }
-    let division = division(vm, rounding, a, b)?;
-    remainder_value(vm, division)
+    let division = division(numbers, rounding, a, b)?;
+    remainder_value(numbers, division)
 }
 
-fn remainder_value(vm: &mut Vm, division: Division) -> Outcome {
+fn remainder_value(numbers: &mut Numbers<'_>, division: Division) -> NumberResult {
     match division {
-        Division::Ints(_, remainder) => vm.integer_value("/", &remainder),
-        Division::Ratio(_, remainder) => vm.ratio_value("/", &remainder),
-        Division::Float(_, remainder) => vm.float_value("/", remainder),
+        Division::Ints(_, remainder) => numbers.integer_value("/", &remainder),
+        Division::Ratio(_, remainder) => numbers.ratio_value("/", &remainder),
+        Division::Float(_, remainder) => numbers.float_value("/", remainder),
     }
 }
 
@@ -137,51 +141,56 @@ fn small(rounding: Rounding, a: Value, b: Value) -> Option<(Int, Int)> {
     Some((Int::from(quotient), Int::from(remainder)))
 }
 
-fn division(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Result<Division, Exit> {
-    let operands = real_operands(vm, a, b)?;
-    divide(vm, rounding, [a, b], operands)
+fn division(numbers: &mut Numbers<'_>, rounding: Rounding, a: Value, b: Value) -> NumberResult<Division> {
+    let operands = real_operands(numbers, a, b)?;
+    divide(numbers, rounding, [a, b], operands)
 }
 
-fn real_operands(vm: &mut Vm, a: Value, b: Value) -> Result<Pair, Exit> {
+fn real_operands(numbers: &mut Numbers<'_>, a: Value, b: Value) -> NumberResult<Pair> {
     if let Some(x) = a.as_double()
         && let Some(y) = b.as_double().or_else(|| b.as_fixnum().map(|n| n as f64))
     {
         return Ok(Pair::Floats(x, y));
     }
-    typed_operands(vm, "/", a, b, "REAL")
+    typed_operands(numbers, "/", a, b, "REAL")
 }
 
 /// Divides numbers of one type, which the values `operands` are.
-fn divide(vm: &mut Vm, rounding: Rounding, operands: [Value; 2], numbers: Pair) -> Result<Division, Exit> {
-    match numbers {
-        Pair::Ints(_, y) if y.is_zero() => vm.exchange.raise(Raised::DivisionByZero("/", operands)),
+fn divide(
+    numbers: &mut Numbers<'_>,
+    rounding: Rounding,
+    operands: [Value; 2],
+    pair: Pair,
+) -> NumberResult<Division> {
+    match pair {
+        Pair::Ints(_, y) if y.is_zero() => numbers.fail(NumberFailure::DivisionByZero("/", operands)),
         Pair::Ints(x, y) => {
-            let (quotient, remainder) = int_division(vm, rounding, &x, &y)?;
+            let (quotient, remainder) = int_division(numbers, rounding, &x, &y)?;
             Ok(Division::Ints(quotient, remainder))
         }
         Pair::Ratios(_, y) if y.numerator.is_zero() => {
-            vm.exchange.raise(Raised::DivisionByZero("/", operands))
+            numbers.fail(NumberFailure::DivisionByZero("/", operands))
         }
         Pair::Ratios(x, y) => {
-            check_ratios(vm, &x, &y)?;
+            check_ratios(numbers, &x, &y)?;
             // x / y is the integer quotient n / d; its remainder belongs over the common denominator.
             let n = x.numerator.times(&y.denominator);
             let d = x.denominator.times(&y.numerator);
-            let (quotient, remainder) = int_division(vm, rounding, &n, &d)?;
+            let (quotient, remainder) = int_division(numbers, rounding, &n, &d)?;
             Ok(Division::Ratio(quotient, Ratio::reduced(&remainder, &x.denominator.times(&y.denominator))))
         }
         Pair::Floats(x, y) => {
             // An integer quotient has no minus zero, so that the remainder of minus zero is minus zero.
-            let whole = float_quotient(vm, operands, x, y)?.trunc() + 0.0;
+            let whole = float_quotient(numbers, operands, x, y)?.trunc() + 0.0;
             let (step, remainder) = float_remainder(rounding, x, y, whole);
             Ok(Division::Float(Int::from_f64(whole).plus(&Int::from(i64::from(step))), remainder))
         }
     }
 }
 
-fn int_division(vm: &mut Vm, rounding: Rounding, a: &Int, b: &Int) -> Result<(Int, Int), Exit> {
-    vm.check_work(2 * (a.len() + 1).saturating_sub(b.len()), b.len())?;
-    vm.exchange.charge(a.len() + b.len());
+fn int_division(numbers: &mut Numbers<'_>, rounding: Rounding, a: &Int, b: &Int) -> NumberResult<(Int, Int)> {
+    numbers.check_work(2 * (a.len() + 1).saturating_sub(b.len()), b.len())?;
+    numbers.charge(a.len() + b.len());
     let (quotient, remainder) = a.div_rem(b);
     if remainder.is_zero() || rounding == Rounding::Truncate {
         return Ok((quotient, remainder));
@@ -196,13 +205,13 @@ fn int_division(vm: &mut Vm, rounding: Rounding, a: &Int, b: &Int) -> Result<(In
 }
 
 /// Returns the quotient of the doubles `x` and `y`, which the values `operands` are.
-fn float_quotient(vm: &mut Vm, operands: [Value; 2], x: f64, y: f64) -> Result<f64, Exit> {
+fn float_quotient(numbers: &mut Numbers<'_>, operands: [Value; 2], x: f64, y: f64) -> NumberResult<f64> {
     if y == 0.0 && x != 0.0 {
-        return vm.exchange.raise(Raised::DivisionByZero("/", operands));
+        return numbers.fail(NumberFailure::DivisionByZero("/", operands));
     }
     let quotient = x / y;
     if !quotient.is_finite() {
-        return vm.float_value("/", quotient).map(|_| unreachable!("the value is not finite"));
+        return numbers.float_value("/", quotient).map(|_| unreachable!("the value is not finite"));
     }
     Ok(quotient)
 }

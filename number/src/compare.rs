@@ -2,12 +2,10 @@
 
 use std::cmp::Ordering;
 
+use esl_heap::{Heap, Value};
+
 use super::limbs::BigOperand;
-use super::{Int, Number, Ratio, float, same_value};
-use crate::heap::Heap;
-use crate::raise::Exit;
-use crate::value::Value;
-use crate::vm::Vm;
+use super::{Int, Number, NumberResult, Numbers, Ratio, float, same_value};
 
 /// Returns both numbers as doubles of exactly their values, if neither is an object in the heap.
 #[inline]
@@ -21,38 +19,43 @@ fn exact_doubles(a: Value, b: Value) -> Option<(f64, f64)> {
 }
 
 /// Implements `(= a b)`.
-pub(crate) fn num_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
+#[inline]
+pub fn num_equal(numbers: &mut Numbers<'_>, a: Value, b: Value) -> NumberResult<bool> {
     if let Some((x, y)) = exact_doubles(a, b) {
         return Ok(x == y);
     }
     for v in [a, b] {
-        if !super::is_number(&vm.heap, v) {
-            return vm.exchange.type_error(v, "NUMBER");
+        if !super::is_number(numbers.heap, v) {
+            return numbers.type_error(v, "NUMBER");
         }
     }
-    Ok(same_value(&vm.heap, a, b))
+    Ok(same_value(numbers.heap, a, b))
 }
 
 /// Implements `(< a b)`.
-pub(crate) fn less(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
-    Ok(compare(vm, "<", a, b, "REAL")? == Some(Ordering::Less))
+#[inline]
+pub fn less(numbers: &mut Numbers<'_>, a: Value, b: Value) -> NumberResult<bool> {
+    Ok(compare(numbers, "<", a, b, "REAL")? == Some(Ordering::Less))
 }
 
 /// Implements `(<= a b)`.
-pub(crate) fn less_or_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
-    Ok(matches!(compare(vm, "<=", a, b, "REAL")?, Some(Ordering::Less | Ordering::Equal)))
+#[inline]
+pub fn less_or_equal(numbers: &mut Numbers<'_>, a: Value, b: Value) -> NumberResult<bool> {
+    Ok(matches!(compare(numbers, "<=", a, b, "REAL")?, Some(Ordering::Less | Ordering::Equal)))
 }
 
 /// Returns −1, 0 or 1, as `a` is below, at or above zero.
-pub(crate) fn sign(vm: &mut Vm, a: Value, expected: &'static str) -> Result<i32, Exit> {
-    match sign_of(&vm.heap, a) {
+#[inline]
+pub fn sign(numbers: &mut Numbers<'_>, a: Value, expected: &'static str) -> NumberResult<i32> {
+    match sign_of(numbers.heap, a) {
         Some(sign) => Ok(sign),
-        None => vm.exchange.type_error(a, expected),
+        None => numbers.type_error(a, expected),
     }
 }
 
 /// As [`sign`]; `None` unless `a` is a number.
-pub(crate) fn sign_of(heap: &Heap, a: Value) -> Option<i32> {
+#[inline]
+pub fn sign_of(heap: &Heap, a: Value) -> Option<i32> {
     if let Some(n) = a.as_fixnum() {
         return Some(n.signum() as i32);
     }
@@ -68,35 +71,36 @@ pub(crate) fn sign_of(heap: &Heap, a: Value) -> Option<i32> {
 
 /// Compares `a` with `b`; `None` if one of them is a NaN.
 fn compare(
-    vm: &mut Vm,
+    numbers: &mut Numbers<'_>,
     op: &'static str,
     a: Value,
     b: Value,
     expected: &'static str,
-) -> Result<Option<Ordering>, Exit> {
+) -> NumberResult<Option<Ordering>> {
     if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum()) {
         return Ok(Some(x.cmp(&y)));
     }
     if let Some((x, y)) = exact_doubles(a, b) {
         return Ok(x.partial_cmp(&y));
     }
-    if let (Some(x), Some(y)) = (BigOperand::of(&vm.heap, a, &mut [0]), BigOperand::of(&vm.heap, b, &mut [0]))
+    if let (Some(x), Some(y)) =
+        (BigOperand::of(numbers.heap, a, &mut [0]), BigOperand::of(numbers.heap, b, &mut [0]))
     {
         let (order, work) = (x.compare(&y), x.len().min(y.len()));
-        vm.exchange.charge(work);
+        numbers.charge(work);
         return Ok(Some(order));
     }
-    let (x, y) = (vm.number(a, expected)?, vm.number(b, expected)?);
+    let (x, y) = (numbers.number(a, expected)?, numbers.number(b, expected)?);
     Ok(match (&x, &y) {
         (Number::Int(x), Number::Int(y)) => Some(x.compare(y)),
         (Number::Float(x), Number::Float(y)) => x.partial_cmp(y),
         (Number::Float(x), Number::Int(y)) => float_and_int(*x, y),
         (Number::Int(x), Number::Float(y)) => float_and_int(*y, x).map(Ordering::reverse),
-        (Number::Float(x), Number::Ratio(y)) => float_and_ratio(vm, op, *x, y)?,
-        (Number::Ratio(x), Number::Float(y)) => float_and_ratio(vm, op, *y, x)?.map(Ordering::reverse),
-        (Number::Ratio(x), Number::Ratio(y)) => Some(x.compare(vm, op, y)?),
-        (Number::Ratio(x), Number::Int(y)) => Some(x.compare(vm, op, &Ratio::integer(y.clone()))?),
-        (Number::Int(x), Number::Ratio(y)) => Some(Ratio::integer(x.clone()).compare(vm, op, y)?),
+        (Number::Float(x), Number::Ratio(y)) => float_and_ratio(numbers, op, *x, y)?,
+        (Number::Ratio(x), Number::Float(y)) => float_and_ratio(numbers, op, *y, x)?.map(Ordering::reverse),
+        (Number::Ratio(x), Number::Ratio(y)) => Some(x.compare(numbers, op, y)?),
+        (Number::Ratio(x), Number::Int(y)) => Some(x.compare(numbers, op, &Ratio::integer(y.clone()))?),
+        (Number::Int(x), Number::Ratio(y)) => Some(Ratio::integer(x.clone()).compare(numbers, op, y)?),
     })
 }
 
@@ -113,6 +117,11 @@ fn float_and_int(x: f64, n: &Int) -> Option<Ordering> {
     }
 }
 
-fn float_and_ratio(vm: &mut Vm, op: &'static str, x: f64, r: &Ratio) -> Result<Option<Ordering>, Exit> {
-    if x.is_finite() { float::rational(x).compare(vm, op, r).map(Some) } else { Ok(x.partial_cmp(&0.0)) }
+fn float_and_ratio(
+    numbers: &mut Numbers<'_>,
+    op: &'static str,
+    x: f64,
+    r: &Ratio,
+) -> NumberResult<Option<Ordering>> {
+    if x.is_finite() { float::rational(x).compare(numbers, op, r).map(Some) } else { Ok(x.partial_cmp(&0.0)) }
 }

@@ -2,36 +2,34 @@
 
 use std::cmp::Ordering;
 
+use esl_heap::{Heap, Value};
+
 use super::gcd::gcd;
-use super::{Int, limit};
-use crate::heap::Heap;
-use crate::raise::{Exit, Raised};
-use crate::value::Value;
-use crate::vm::Vm;
+use super::{Int, NumberFailure, NumberResult, Numbers, limit};
 
 /// A quotient of integers; an integer has the denominator 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Ratio {
+pub struct Ratio {
     /// Numerator, which carries the sign.
-    pub(crate) numerator: Int,
+    pub numerator: Int,
     /// Denominator; above zero, and coprime to the numerator.
-    pub(crate) denominator: Int,
+    pub denominator: Int,
 }
 
 impl Ratio {
     /// Returns the ratio that `v` is; `None` for any other value.
-    pub(crate) fn of(heap: &Heap, v: Value) -> Option<Ratio> {
+    pub fn of(heap: &Heap, v: Value) -> Option<Ratio> {
         let (numerator, denominator) = heap.ratio(v)?;
         Some(Ratio { numerator: Int::of(heap, numerator)?, denominator: Int::of(heap, denominator)? })
     }
 
     /// Returns the integer `n` over 1.
-    pub(crate) fn integer(n: Int) -> Ratio {
+    pub fn integer(n: Int) -> Ratio {
         Ratio { numerator: n, denominator: Int::ONE }
     }
 
     /// Returns `numerator / denominator` in lowest terms. The denominator is not zero.
-    pub(crate) fn reduced(numerator: &Int, denominator: &Int) -> Ratio {
+    pub fn reduced(numerator: &Int, denominator: &Int) -> Ratio {
         let divisor = gcd(numerator, denominator);
         let divisor = if denominator.is_negative() { divisor.negated() } else { divisor };
         Ratio {
@@ -41,7 +39,7 @@ impl Ratio {
     }
 
     /// Returns the sum.
-    pub(crate) fn plus(&self, other: &Ratio) -> Ratio {
+    pub fn plus(&self, other: &Ratio) -> Ratio {
         // Knuth 4.5.1: these divisors are much smaller than that of the full products.
         let divisor = gcd(&self.denominator, &other.denominator);
         let (left, right) =
@@ -58,7 +56,7 @@ impl Ratio {
     }
 
     /// Returns the product.
-    pub(crate) fn times(&self, other: &Ratio) -> Ratio {
+    pub fn times(&self, other: &Ratio) -> Ratio {
         let first = gcd(&self.numerator, &other.denominator);
         let second = gcd(&other.numerator, &self.denominator);
         let numerator = self.numerator.exact_quotient(&first).times(&other.numerator.exact_quotient(&second));
@@ -68,12 +66,12 @@ impl Ratio {
     }
 
     /// Returns the ratio with the opposite sign.
-    pub(crate) fn negated(&self) -> Ratio {
+    pub fn negated(&self) -> Ratio {
         Ratio { numerator: self.numerator.negated(), denominator: self.denominator.clone() }
     }
 
     /// Returns the reciprocal of a ratio that is not zero.
-    pub(crate) fn inverted(&self) -> Ratio {
+    pub fn inverted(&self) -> Ratio {
         if self.numerator.is_negative() {
             Ratio { numerator: self.denominator.negated(), denominator: self.numerator.negated() }
         } else {
@@ -82,12 +80,12 @@ impl Ratio {
     }
 
     /// Returns the length of the longer part in limbs: the unit of work.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.numerator.len().max(self.denominator.len())
     }
 
     /// Returns the nearest double, halves to even; infinite on overflow.
-    pub(crate) fn to_f64(&self) -> f64 {
+    pub fn to_f64(&self) -> f64 {
         if self.denominator.is_one() {
             return self.numerator.to_f64();
         }
@@ -107,7 +105,12 @@ impl Ratio {
     }
 
     /// Compares with `other`. Fails as operation `op` if that takes too much work.
-    pub(crate) fn compare(&self, vm: &mut Vm, op: &'static str, other: &Ratio) -> Result<Ordering, Exit> {
+    pub fn compare(
+        &self,
+        numbers: &mut Numbers<'_>,
+        op: &'static str,
+        other: &Ratio,
+    ) -> NumberResult<Ordering> {
         let (left, right) = (self.numerator.signum(), other.numerator.signum());
         if left != right || left == 0 {
             return Ok(left.cmp(&right));
@@ -123,9 +126,9 @@ impl Ratio {
             self.numerator.len() * other.denominator.len() + other.numerator.len() * self.denominator.len();
         if work > limit::WORK_LIMIT {
             let text = format!("ratios of {low} bits that are nearly equal are too large to be compared");
-            return vm.exchange.raise(Raised::Arithmetic(op, text));
+            return numbers.fail(NumberFailure::Arithmetic(op, text));
         }
-        vm.exchange.charge(work);
+        numbers.charge(work);
         Ok(self.numerator.times(&other.denominator).compare(&other.numerator.times(&self.denominator)))
     }
 }
