@@ -39,6 +39,7 @@ impl Database {
         let mut cells = std::mem::take(&mut self.cells);
         cells.clear();
         let made = formula::fact(&mut self.terms, heap, fact, &mut cells, work);
+        *work += self.terms.take_work();
         let outcome = made.and_then(|()| self.add(heap, &cells, work));
         self.cells = cells;
         outcome
@@ -51,9 +52,9 @@ impl Database {
         self.terms.release(functor);
         let relation = &self.relations[number as usize];
         let mut outcome = Value::T;
-        if relation.find(arguments).is_some() {
+        if relation.find(arguments, work).is_some() {
             outcome = Value::NIL;
-        } else if let Some(row) = relation.replaced(arguments) {
+        } else if let Some(row) = relation.replaced(arguments, work) {
             match self.fact_value(heap, number, row, work) {
                 Ok(replaced) => outcome = replaced,
                 Err(error) => {
@@ -140,11 +141,13 @@ impl Database {
         let mut cells = std::mem::take(&mut self.cells);
         cells.clear();
         let made = formula::fact(&mut self.terms, heap, arguments, &mut cells, work);
+        *work += self.terms.take_work();
         let value = made.and_then(|()| {
             let found = self.find_relation(cells[0], cells.len());
             cells.push(Term::NIL);
-            let row = found
-                .and_then(|number| Some((number, self.relations[number as usize].replaced(&cells[1..])?)));
+            let row = found.and_then(|number| {
+                Some((number, self.relations[number as usize].replaced(&cells[1..], work)?))
+            });
             cells.pop();
             cells.iter().for_each(|&term| self.terms.release(term));
             match row {
@@ -169,10 +172,11 @@ impl Database {
         let mut cells = std::mem::take(&mut self.cells);
         cells.clear();
         let made = formula::fact(&mut self.terms, heap, fact, &mut cells, work);
+        *work += self.terms.take_work();
         let was_there = made.map(|()| {
             let found = self.find_relation(cells[0], cells.len() - 1);
-            let row =
-                found.and_then(|number| Some((number, self.relations[number as usize].find(&cells[1..])?)));
+            let row = found
+                .and_then(|number| Some((number, self.relations[number as usize].find(&cells[1..], work)?)));
             cells.iter().for_each(|&term| self.terms.release(term));
             if let Some((number, row)) = row {
                 self.end(number, row);

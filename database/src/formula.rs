@@ -9,7 +9,7 @@
 //! package, since programs use names such as `test` themselves. A variable is a symbol whose name begins with
 //! `?`; each `?` alone is a different variable.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use esl_heap::Value;
 use esl_heap::heap::{AllocError, Heap};
@@ -48,6 +48,17 @@ pub(super) struct Pattern {
     pub(super) arguments: SmallVec<[Term; 6]>,
     /// Pattern for the list of all further arguments; `NIL` for none.
     pub(super) tail: Term,
+    /// Position of the first argument that is a variable and stands before, too; else the number of arguments.
+    pub(super) first_repeated: usize,
+}
+
+impl Pattern {
+    pub(super) fn new(rank: usize, functor: Term, arguments: SmallVec<[Term; 6]>, tail: Term) -> Pattern {
+        let mut seen = BTreeSet::new();
+        let is_repeated = |argument: &Term| argument.as_variable().is_some_and(|one| !seen.insert(one));
+        let first_repeated = arguments.iter().position(is_repeated).unwrap_or(arguments.len());
+        Pattern { rank, functor, arguments, tail, first_repeated }
+    }
 }
 
 /// A condition computed by the program.
@@ -232,6 +243,8 @@ pub(super) struct FormulaParser<'a> {
     inherited: BTreeMap<u64, Term>,
     numbers: BTreeMap<u64, u32>,
     parts: usize,
+    /// Number of atoms and pairs of the values from outside.
+    inherited_parts: usize,
     query: Value,
 }
 
@@ -246,6 +259,7 @@ impl<'a> FormulaParser<'a> {
             inherited: BTreeMap::new(),
             numbers: BTreeMap::new(),
             parts: MOST_PARTS,
+            inherited_parts: 0,
             query,
         }
     }
@@ -262,6 +276,7 @@ impl<'a> FormulaParser<'a> {
                 continue;
             }
             let term = convert(self.terms, self.heap, binding.cdr, &mut parts, &mut |_, _, _| Ok(None))?;
+            self.inherited_parts = MAX_SIZE as usize - parts;
             self.held.push(term);
             self.inherited.insert(binding.car.bits(), term);
         }
@@ -270,7 +285,7 @@ impl<'a> FormulaParser<'a> {
 
     /// Returns the number of atoms and pairs parsed so far.
     pub(super) fn work(&self) -> usize {
-        MOST_PARTS - self.parts
+        MOST_PARTS - self.parts + self.inherited_parts
     }
 
     fn malformed<T>(&self, v: Value, expected: &'static str) -> Result<T, FormulaError> {
@@ -369,7 +384,7 @@ impl<'a> FormulaParser<'a> {
         if tail != Term::NIL && tail.as_variable().is_none() {
             return self.malformed(v, "a pattern, which is a list with at most a variable after its dot");
         }
-        Ok(Pattern { rank, functor, arguments, tail })
+        Ok(Pattern::new(rank, functor, arguments, tail))
     }
 
     /// Returns the term of an object as it is, including its variables.

@@ -5,6 +5,7 @@
 //! formula   queries as written         rule       rules and their strata     plan     the order of goals
 //! query     from question to answers   solver     running goals              scan     several relations
 //! tuple     sets of answers            facts      changes of facts           open     queries that are open
+//! effort    work, as it is charged
 //! ```
 //!
 //! Guarantees: a query sees the facts as they were when it began, whatever happens meanwhile. No single
@@ -23,6 +24,7 @@
 #![forbid(unsafe_code)]
 
 mod bucket;
+mod effort;
 mod facts;
 mod formula;
 mod index;
@@ -49,6 +51,7 @@ use esl_heap::heap::{AllocError, Heap, Holder};
 use esl_heap::list_state;
 
 use bucket::Buckets;
+pub use effort::Effort;
 pub use formula::FormulaError;
 use formula::FormulaParser;
 use query::Query;
@@ -172,6 +175,7 @@ impl Database {
             .and_then(|head| Ok((head, parser.formula(body, 0)?, parser.text(source)?)));
         *work += 4 * parser.work();
         let FormulaParser { held, names, .. } = parser;
+        *work += self.terms.take_work();
         let (head, body, source) = match parsed {
             Ok(parts) => parts,
             Err(error) => {
@@ -185,7 +189,8 @@ impl Database {
             return Err(FormulaError::Malformed(head_text, "the head of a rule, which is not a property"));
         }
         let rule = Rule { head, body, names, source, held };
-        if let Some(replaced) = Arc::make_mut(&mut self.rules).add(rule) {
+        *work += self.rules_to_copy();
+        if let Some(replaced) = Arc::make_mut(&mut self.rules).add(rule, work) {
             self.retired.push_back((self.serial, replaced.held.clone()));
         }
         Ok(())
@@ -206,8 +211,10 @@ impl Database {
         let text = parser.text(source);
         *work += 4 * parser.work();
         let FormulaParser { held, .. } = parser;
+        *work += self.terms.take_work();
+        *work += self.rules_to_copy();
         let rules = Arc::make_mut(&mut self.rules);
-        let removed = text.as_ref().ok().and_then(|&source| rules.remove(source));
+        let removed = text.as_ref().ok().and_then(|&source| rules.remove(source, work));
         held.into_iter().for_each(|term| self.terms.release(term));
         if let Some(rule) = &removed {
             self.retired.push_back((self.serial, rule.held.clone()));
@@ -215,15 +222,23 @@ impl Database {
         text.map(|_| removed.is_some())
     }
 
+    /// Returns the number of predicates and rules that a change of the rules copies for an open query.
+    fn rules_to_copy(&self) -> usize {
+        if Arc::strong_count(&self.rules) == 1 {
+            return 0;
+        }
+        self.rules.predicates.iter().map(|predicate| 1 + predicate.rules.len() / 8).sum()
+    }
+
     // ---- terms and room
 
-    /// Returns the object of a term.
+    /// Returns the object of a term. Adds the work done to `work`.
     ///
     /// # Errors
     /// As for every allocation.
     #[inline]
-    pub fn value(&self, heap: &mut Heap, term: Term) -> Result<Value, AllocError> {
-        self.terms.value(heap, term, &mut 0)
+    pub fn value(&self, heap: &mut Heap, term: Term, work: &mut usize) -> Result<Value, AllocError> {
+        self.terms.value(heap, term, work)
     }
 
     /// Checks that there is room for the database's bytes.

@@ -4,7 +4,7 @@ use esl_heap::Value;
 use esl_heap::heap::{AllocError, Heap, Holder};
 
 use super::query::QueryRoom;
-use super::{Database, FormulaError, Progress, Query, QueryError};
+use super::{Database, Effort, FormulaError, Progress, Query, QueryError};
 
 impl Database {
     /// Begins a query (see [`Query::begin`]) and returns its number.
@@ -29,11 +29,11 @@ impl Database {
         Ok(number)
     }
 
-    /// Runs a query until `work` is used up or the query needs something. `None` if it is not open.
-    pub fn step(&mut self, key: u64, work: &mut usize) -> Option<Result<Progress, QueryError>> {
+    /// Runs a query until the effort is used up or the query needs something. `None` if it is not open.
+    pub fn step(&mut self, key: u64, effort: &mut Effort) -> Option<Result<Progress, QueryError>> {
         let mut query = self.queries.get_mut(&key)?.take()?;
         let before = query.bytes();
-        let progress = query.step(self, work);
+        let progress = query.step(self, effort);
         self.bytes += query.bytes();
         self.bytes -= before;
         self.queries.insert(key, Some(query));

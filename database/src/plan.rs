@@ -7,6 +7,7 @@
 //!
 //! A goal names its successor, so that nested formulas become one graph.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::formula::{Formula, Pattern, TestForm};
@@ -55,6 +56,41 @@ enum Arranged<'f> {
     Or(Vec<Arranged<'f>>, usize, usize),
     Not(Box<Arranged<'f>>),
     Test(&'f TestForm),
+}
+
+/// The generators of a conjunction that have no place in the order yet.
+struct Generators {
+    /// Variables that each of them binds, by its position in the conjunction.
+    binds: BTreeMap<usize, Vec<usize>>,
+    /// Number of those that bind a variable, by its number.
+    binders: Vec<u32>,
+}
+
+impl Generators {
+    fn of(planner: &Planner<'_>, parts: &[Formula], generators: &[usize], variables: usize) -> Generators {
+        let mut binders = vec![0; variables];
+        let mut binds = BTreeMap::new();
+        for &at in generators {
+            let mut bound = Vec::new();
+            planner.each_bound(&parts[at], &mut |variable| bound.push(variable));
+            bound.iter().for_each(|&variable: &usize| binders[variable] += 1);
+            binds.insert(at, bound);
+        }
+        Generators { binds, binders }
+    }
+
+    fn remove(&mut self, at: usize) {
+        for variable in self.binds.remove(&at).unwrap_or_default() {
+            self.binders[variable] -= 1;
+        }
+    }
+
+    /// Returns whether a test or negation can come now: its variables are bound, or none of these binds them;
+    /// and if it is a guard, none of these stands before it.
+    fn allow(&self, at: usize, guards: bool, used: &[usize], now: &Bound) -> bool {
+        let is_ready = used.iter().all(|&variable| now[variable] || self.binders[variable] == 0);
+        is_ready && (!guards || self.binds.first_key_value().is_none_or(|(&first, _)| first > at))
+    }
 }
 
 /// The planner: makes goals of formulas.
@@ -112,6 +148,7 @@ impl Planner<'_> {
     /// Makes the goals of a pattern: the facts, and an alternative for each predicate with rules that it may
     /// match.
     fn emit_pattern(&mut self, pattern: &Pattern, next: GoalId) -> GoalId {
+        self.work += pattern.arguments.len() / 8;
         let is_plain = pattern.functor.as_variable().is_none() && pattern.tail == Term::NIL;
         let relation = match is_plain {
             true => self.database.find_relation(pattern.functor, pattern.arguments.len()),
@@ -119,6 +156,7 @@ impl Planner<'_> {
         };
         let shared = Arc::new(pattern.clone());
         let predicates: Vec<usize> = self.rules.matching(pattern).collect();
+        self.work += predicates.len();
         if let (true, [predicate]) = (is_plain, predicates.as_slice()) {
             return self.add(Goal::Call { pattern: shared.clone(), predicate: *predicate, next });
         }
@@ -134,7 +172,8 @@ impl Planner<'_> {
     }
 
     fn arrange<'f>(&mut self, formula: &'f Formula, bound: &mut Bound) -> Arranged<'f> {
-        self.work += 1;
+        // Alternatives and negations have copies of what is bound.
+        self.work += 1 + bound.len() / 64;
         match formula {
             Formula::Pattern(pattern) => {
                 self.bind(formula, bound);
@@ -172,11 +211,18 @@ impl Planner<'_> {
         // Tests and negations, each placed as early as possible.
         let mut waiting: Vec<usize> = (0..parts.len()).filter(|at| !is_generator(at)).collect();
         let mut order = Vec::with_capacity(parts.len());
+        if waiting.is_empty() {
+            return chosen;
+        }
         let mut now = bound.clone();
+        let mut to_come = Generators::of(self, parts, &generators, bound.len());
+        let used: Vec<Vec<usize>> = parts.iter().map(|part| self.variables_used(part)).collect();
         let mut left = chosen.iter().copied();
         loop {
             waiting.retain(|&at| {
-                let comes = self.may_come(parts, at, &now, &generators, &order);
+                self.work += 1 + used[at].len() / 8;
+                let guards = matches!(parts[at], Formula::Test(_));
+                let comes = to_come.allow(at, guards, &used[at], &now);
                 if comes {
                     order.push(at);
                 }
@@ -184,30 +230,20 @@ impl Planner<'_> {
             });
             let Some(at) = left.next() else { break };
             self.bind_surely(&parts[at], &mut now);
+            to_come.remove(at);
             order.push(at);
         }
         order.extend(waiting);
         order
     }
 
-    /// Returns whether a test or negation can follow the parts that are in order so far.
-    fn may_come(
-        &self,
-        parts: &[Formula],
-        at: usize,
-        now: &Bound,
-        generators: &[usize],
-        order: &[usize],
-    ) -> bool {
-        // Variables that are certainly bound by now, or that later patterns do not bind.
-        let mut open = vec![false; now.len()];
-        for &other in generators.iter().filter(|other| !order.contains(other)) {
-            self.bind(&parts[other], &mut open);
-        }
-        let mut is_ready = true;
-        self.each_variable(&parts[at], &mut |variable| is_ready &= now[variable] || !open[variable]);
-        let guards = matches!(parts[at], Formula::Test(_));
-        is_ready && (!guards || generators.iter().all(|&other| other > at || order.contains(&other)))
+    /// Returns the variables that stand in a formula.
+    fn variables_used(&self, formula: &Formula) -> Vec<usize> {
+        let mut used = Vec::new();
+        self.each_variable(formula, &mut |variable| used.push(variable));
+        used.sort_unstable();
+        used.dedup();
+        used
     }
 
     fn each_variable(&self, formula: &Formula, visit: &mut dyn FnMut(usize)) {
@@ -218,6 +254,17 @@ impl Planner<'_> {
             }
             Formula::Not(inside) => self.each_variable(inside, visit),
             Formula::Test(test) => test.variables.iter().for_each(|&variable| visit(variable as usize)),
+        }
+    }
+
+    /// Calls `visit` with the variables that some answer to a formula binds.
+    fn each_bound(&self, formula: &Formula, visit: &mut dyn FnMut(usize)) {
+        match formula {
+            Formula::Pattern(pattern) => variables_of(&self.database.terms, pattern, visit),
+            Formula::And(parts) | Formula::Or(parts, ..) => {
+                parts.iter().for_each(|part| self.each_bound(part, visit));
+            }
+            Formula::Not(_) | Formula::Test(_) => {}
         }
     }
 
@@ -243,15 +290,7 @@ impl Planner<'_> {
 
     /// Marks the variables that some answer to a formula binds.
     fn bind(&self, formula: &Formula, bound: &mut Bound) {
-        match formula {
-            Formula::Pattern(pattern) => {
-                variables_of(&self.database.terms, pattern, &mut |variable| bound[variable] = true);
-            }
-            Formula::And(parts) | Formula::Or(parts, ..) => {
-                parts.iter().for_each(|part| self.bind(part, bound))
-            }
-            Formula::Not(_) | Formula::Test(_) => {}
-        }
+        self.each_bound(formula, &mut |variable| bound[variable] = true);
     }
 
     fn cost(&mut self, parts: &[Formula], order: &[usize], bound: &Bound) -> f64 {
@@ -291,7 +330,10 @@ impl Planner<'_> {
     fn estimate(&mut self, formula: &Formula, bound: &Bound) -> f64 {
         self.work += 1;
         match formula {
-            Formula::Pattern(pattern) => self.estimate_pattern(pattern, bound),
+            Formula::Pattern(pattern) => {
+                self.work += pattern.arguments.len() / 8;
+                self.estimate_pattern(pattern, bound)
+            }
             Formula::And(parts) => {
                 let mut now = bound.clone();
                 parts.iter().fold(1.0, |rows, part| {

@@ -18,6 +18,7 @@ use esl_heap::heap::Heap;
 use smallvec::SmallVec;
 
 use super::Database;
+use super::effort::{Effort, ITEM};
 use super::formula::{Formula, FormulaError, FormulaParser, Pattern, TestForm};
 use super::plan::{Goal, GoalId, Planner};
 use super::rule::{Rule, Rules};
@@ -70,6 +71,13 @@ pub(super) struct Continuation {
     pub(super) sink: u32,
     pub(super) bindings: Box<[Term]>,
     pub(super) keys: Box<[u64]>,
+}
+
+impl Continuation {
+    /// Returns the bytes that it takes, approximately.
+    pub(super) fn bytes(&self) -> usize {
+        size_of::<Continuation>() + 32 + 8 * (self.bindings.len() + self.keys.len())
+    }
 }
 
 /// A piece of work to be done.
@@ -153,8 +161,10 @@ pub(crate) struct Query {
 
     // ---- rules
     pub(super) tables: Vec<Answers>,
-    /// Bytes of their answers, approximately.
+    /// Bytes of them and their answers, approximately.
     pub(super) table_bytes: usize,
+    /// Bytes of computations that have been set aside, approximately.
+    pub(super) waiting_bytes: usize,
     /// Tables by the hash of their call.
     pub(super) by_call: super::bucket::Buckets,
     pub(super) consumers: Vec<Consumer>,
@@ -182,6 +192,8 @@ pub(crate) struct Query {
     /// Whether an answer may be found more than once.
     pub(super) may_repeat: bool,
     pub(super) placed: BinaryHeap<RankedAnswer>,
+    /// Bytes of those, approximately.
+    pub(super) placed_bytes: usize,
     pub(super) found: usize,
     pub(super) tuples: Tuples,
     /// The facts found, as relation and row, if the caller asked for facts.
@@ -248,6 +260,7 @@ impl Query {
         });
         *work += parser.work();
         let FormulaParser { held, names, ranks, .. } = parser;
+        *work += database.terms.take_work();
         let formula = match parsed {
             Ok(formula) => formula,
             Err(error) => {
@@ -255,6 +268,10 @@ impl Query {
                 return Err(error);
             }
         };
+        if !wants_facts && !database.rules.is_stratified() {
+            *work += database.rules_to_copy();
+            Arc::make_mut(&mut database.rules).stratify(work);
+        }
         let rules = if wants_facts { Arc::default() } else { database.rules.clone() };
         let QueryRoom { mut goals, mut sinks, mut bindings, mut keys, mut asked, .. } = room;
         goals.push(Goal::Solved);
@@ -279,6 +296,8 @@ impl Query {
             rule_goals: BTreeMap::new(),
             tables: Vec::new(),
             table_bytes: 0,
+            waiting_bytes: 0,
+            placed_bytes: 0,
             by_call: Default::default(),
             consumers: Vec::new(),
             sinks,
@@ -304,13 +323,17 @@ impl Query {
     }
 
     /// Records an answer for the program.
-    pub(super) fn answer(&mut self) {
+    pub(super) fn answer(&mut self, effort: &mut Effort) {
         if self.rows.is_some() {
             return;
         }
+        effort.spend_cells(self.asked.len());
+        let ranked = ranked_bytes(&self.keys, &self.asked);
         let Query { bindings, asked, tuples, .. } = self;
         let values = asked.iter().map(|&variable| bindings[variable as usize]);
         if self.is_reordered {
+            effort.spend_cells(self.keys.len());
+            self.placed_bytes += ranked;
             let keys = self.keys.clone().into();
             self.placed.push(RankedAnswer { keys, number: self.found, values: values.collect() });
             self.found += 1;
@@ -321,18 +344,22 @@ impl Query {
         }
     }
 
-    /// Sorts the answers. Returns false if the work is used up before the end.
-    pub(super) fn put_into_order(&mut self, work: &mut usize) -> bool {
+    /// Sorts the answers. Returns false if the effort is used up before the end.
+    pub(super) fn put_into_order(&mut self, effort: &mut Effort) -> bool {
         while let Some(placed) = self.placed.pop() {
+            self.placed_bytes -= ranked_bytes(&self.keys, &self.asked);
+            effort.spend_cells(placed.values.len());
             let values = placed.values.iter().copied();
             if self.may_repeat {
                 self.tuples.insert(values);
             } else {
                 self.tuples.push(values);
             }
-            match work.checked_sub(1 + self.placed.len().checked_ilog2().unwrap_or(0) as usize) {
-                Some(left) => *work = left,
-                None => return false,
+            let comparisons = self.placed.len().checked_ilog2().unwrap_or(0) as usize;
+            effort.spend(comparisons * ITEM);
+            effort.spend_cells(comparisons * placed.keys.len() / 4);
+            if !effort.take_item() {
+                return false;
             }
         }
         true
@@ -351,10 +378,15 @@ impl Query {
 
     /// Returns the bytes in use, approximately.
     pub(super) fn bytes(&self) -> usize {
-        let consumers = self.consumers.len() * (size_of::<Consumer>() + 64);
-        let placed = self.placed.len() * 96;
-        self.table_bytes + consumers + placed + self.tuples.bytes() + 8 * self.held.len()
+        let goals = self.goals.len() * size_of::<Goal>();
+        let queued = goals + self.table_bytes + self.waiting_bytes + self.placed_bytes;
+        queued + self.tuples.bytes() + 8 * self.held.len()
     }
+}
+
+/// Returns the bytes that an answer with its sort key takes, approximately.
+fn ranked_bytes(keys: &[u64], asked: &[u32]) -> usize {
+    size_of::<RankedAnswer>() + 32 + 8 * (keys.len() + asked.len())
 }
 
 /// Returns whether a formula may have the same answer twice, if the values of all variables are asked for.

@@ -12,6 +12,7 @@
 //! sequence of queries is at most a few times that with the best choice of indexes.
 
 use super::bucket::{Buckets, NONE};
+use super::effort::Effort;
 use super::index::{ChainLink, EMPTY, Ends, Index, hash_cells, push, unlink};
 use super::term::Term;
 
@@ -113,9 +114,12 @@ impl Relation {
         self.spans[row as usize].died == u64::MAX
     }
 
-    /// Returns the row of a current fact.
-    pub(super) fn find(&self, cells: &[Term]) -> Option<u32> {
-        let is_it = |row| self.is_live(row) && self.row(row) == cells;
+    /// Returns the row of a current fact. Adds the rows looked at to `work`.
+    pub(super) fn find(&self, cells: &[Term], work: &mut usize) -> Option<u32> {
+        let is_it = |row| {
+            *work += 1;
+            self.is_live(row) && self.row(row) == cells
+        };
         self.set.find(hash_cells(cells), is_it)
     }
 
@@ -143,9 +147,9 @@ impl Relation {
         }
         self.indexes.retain(|index| index.mask != mask);
         self.indexes.insert(0, Index::new(mask, self.ends.first));
-        let mut left = usize::MAX;
-        self.build(0, &mut left);
-        *work += usize::MAX - left;
+        let mut effort = Effort::unbounded();
+        self.build(0, &mut effort);
+        *work += effort.spent() / 4;
     }
 
     /// Lets there be several last arguments for given others.
@@ -158,8 +162,8 @@ impl Relation {
         if (2..=INDEXED_POSITIONS).contains(&width) { (1 << (width - 1)) - 1 } else { 0 }
     }
 
-    /// Returns the row that a new fact replaces, as the value of a property.
-    pub(super) fn replaced(&self, cells: &[Term]) -> Option<u32> {
+    /// Returns the row that a new fact replaces, as the value of a property. Adds the rows looked at to `work`.
+    pub(super) fn replaced(&self, cells: &[Term], work: &mut usize) -> Option<u32> {
         if !self.is_property {
             return None;
         }
@@ -174,6 +178,7 @@ impl Relation {
             None => self.ends.first,
         };
         while row != NONE {
+            *work += 1;
             if self.is_live(row) && self.row(row).starts_with(shared) {
                 return Some(row);
             }
@@ -183,8 +188,11 @@ impl Relation {
     }
 
     /// Returns the row of a fact as of change `time`.
-    fn find_at(&self, cells: &[Term], time: u64) -> Option<u32> {
-        let is_it = |row| self.is_visible(row, time) && self.row(row) == cells;
+    fn find_at(&self, cells: &[Term], time: u64, effort: &mut Effort) -> Option<u32> {
+        let is_it = |row| {
+            effort.spend(1);
+            self.is_visible(row, time) && self.row(row) == cells
+        };
         self.set.find(hash_cells(cells), is_it)
     }
 
@@ -260,9 +268,16 @@ impl Relation {
 
     /// Returns how to find the rows with the cells of `key` at the positions of `bound`, as of change `time`.
     /// `is_all` says that all positions are bound.
-    pub(super) fn access(&mut self, bound: u64, is_all: bool, key: &[Term], time: u64) -> Access {
+    pub(super) fn access(
+        &mut self,
+        bound: u64,
+        is_all: bool,
+        key: &[Term],
+        time: u64,
+        effort: &mut Effort,
+    ) -> Access {
         if is_all {
-            return self.find_at(key, time).map_or(Access::Nothing, Access::One);
+            return self.find_at(key, time, effort).map_or(Access::Nothing, Access::One);
         }
         let rows = self.spans.len() - self.free.len();
         if bound == 0 || rows < FEW {
@@ -324,12 +339,15 @@ impl Relation {
         true
     }
 
-    /// Works on an index until it is complete or the work is used up. Returns whether it is complete.
-    pub(super) fn build(&mut self, number: usize, work: &mut usize) -> bool {
+    /// Works on an index until it is complete or the effort is used up. Returns whether it is complete.
+    pub(super) fn build(&mut self, number: usize, effort: &mut Effort) -> bool {
         let index = &mut self.indexes[number];
+        let covered = index.mask.count_ones() as usize;
         while index.position != NONE {
-            let Some(left) = work.checked_sub(1) else { return false };
-            *work = left;
+            if !effort.take_item() {
+                return false;
+            }
+            effort.spend_cells(covered);
             let row = index.position;
             index.position = self.links[row as usize].after;
             index.take_in(row, &self.cells, self.width);

@@ -1,9 +1,10 @@
 //! Rules, which derive facts from others, and their stratification.
 //!
 //! A rule's head is in a stratum above the predicates that the rule negates. Where no such order exists,
-//! because a predicate depends on its own negation, the predicate has no stratum, and queries for it fail.
+//! because a predicate depends on its own negation, the predicate has no stratum, and queries for it fail. Strata
+//! are found by the first query after a change of the rules.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::formula::{Formula, Pattern};
@@ -39,8 +40,12 @@ pub(super) struct Predicate {
 pub(super) struct Rules {
     pub(super) predicates: Vec<Predicate>,
     by_name: BTreeMap<(u64, usize), usize>,
+    /// Predicates by their number of arguments.
+    by_width: BTreeMap<usize, Vec<usize>>,
     /// The highest stratum, plus one.
     pub(super) strata: usize,
+    /// Whether the strata are those of these rules: they are found when a query needs them.
+    is_stratified: bool,
 }
 
 impl Rules {
@@ -49,29 +54,31 @@ impl Rules {
         self.by_name.contains_key(&(functor.bits(), width))
     }
 
-    /// Adds a rule. Returns the rule that it replaces.
-    pub(super) fn add(&mut self, rule: Rule) -> Option<Arc<Rule>> {
+    /// Adds a rule. Returns the rule that it replaces. Adds the rules looked at to `work`.
+    pub(super) fn add(&mut self, rule: Rule, work: &mut usize) -> Option<Arc<Rule>> {
         let (functor, width) = (rule.head.functor, rule.head.arguments.len());
-        let predicates = &mut self.predicates;
+        let Rules { predicates, by_width, .. } = self;
         let number = *self.by_name.entry((functor.bits(), width)).or_insert_with(|| {
             predicates.push(Predicate { functor, width, rules: Vec::new(), stratum: 0 });
+            by_width.entry(width).or_default().push(predicates.len() - 1);
             predicates.len() - 1
         });
+        self.is_stratified = false;
         let rules = &mut self.predicates[number].rules;
-        let replaced = match rules.iter_mut().find(|other| other.source == rule.source) {
+        *work += rules.len() / 16;
+        match rules.iter_mut().find(|other| other.source == rule.source) {
             Some(other) => Some(std::mem::replace(other, Arc::new(rule))),
             None => {
                 rules.push(Arc::new(rule));
                 None
             }
-        };
-        self.stratify();
-        replaced
+        }
     }
 
-    /// Removes the rule made from this source, and returns it.
-    pub(super) fn remove(&mut self, source: Term) -> Option<Arc<Rule>> {
+    /// Removes the rule made from this source, and returns it. Adds the rules looked at to `work`.
+    pub(super) fn remove(&mut self, source: Term, work: &mut usize) -> Option<Arc<Rule>> {
         let is_it = |rule: &Arc<Rule>| rule.source == source;
+        *work += self.predicates.iter().map(|predicate| 1 + predicate.rules.len() / 16).sum::<usize>();
         let (number, place) = self
             .predicates
             .iter()
@@ -81,61 +88,143 @@ impl Rules {
         let removed = rules.remove(place);
         if rules.is_empty() {
             self.predicates.remove(number);
-            let names = self.predicates.iter().enumerate();
-            self.by_name = names.map(|(at, one)| ((one.functor.bits(), one.width), at)).collect();
+            self.by_name.clear();
+            self.by_width.clear();
+            for (at, predicate) in self.predicates.iter().enumerate() {
+                self.by_name.insert((predicate.functor.bits(), predicate.width), at);
+                self.by_width.entry(predicate.width).or_default().push(at);
+            }
         }
-        self.stratify();
+        self.is_stratified = false;
         Some(removed)
     }
 
-    /// Gives each predicate the least stratum above those of the predicates that it negates.
-    fn stratify(&mut self) {
-        for predicate in &mut self.predicates {
-            predicate.stratum = 0;
-        }
-        let most = self.predicates.len();
-        let mut changes = true;
-        while changes {
-            changes = false;
-            for number in 0..most {
-                let rules = self.predicates[number].rules.clone();
-                let least = rules.iter().map(|rule| self.least_stratum(&rule.body, 0)).max().unwrap_or(0);
-                // More strata than predicates means a cycle.
-                let stratum = if least > most { NO_STRATUM } else { least };
-                if stratum > self.predicates[number].stratum {
-                    self.predicates[number].stratum = stratum;
-                    changes = true;
-                }
-            }
-        }
-        let known = self.predicates.iter().map(|predicate| predicate.stratum).filter(|&s| s != NO_STRATUM);
-        self.strata = known.max().unwrap_or(0) + 1;
+    /// Returns whether each predicate has its stratum.
+    pub(super) fn is_stratified(&self) -> bool {
+        self.is_stratified
     }
 
-    fn least_stratum(&self, formula: &Formula, above: usize) -> usize {
+    /// Gives each predicate the least stratum above those of the predicates that it negates. Adds the
+    /// predicates and their uses to `work`.
+    pub(super) fn stratify(&mut self, work: &mut usize) {
+        let count = self.predicates.len();
+        let uses: Vec<Vec<Use>> = (0..count).map(|number| self.uses(number)).collect();
+        *work += count + uses.iter().map(Vec::len).sum::<usize>();
+        // Each group comes after all those that it depends on.
+        let mut highest = 0;
+        for group in groups(&uses) {
+            let members: BTreeSet<usize> = group.iter().copied().collect();
+            let mut stratum = 0;
+            for one in group.iter().flat_map(|&number| &uses[number]) {
+                let below = match members.contains(&one.predicate) {
+                    // A predicate of the group depends on its own negation.
+                    true if one.is_negated => NO_STRATUM,
+                    true => continue,
+                    false => self.predicates[one.predicate].stratum,
+                };
+                stratum = stratum.max(below.saturating_add(usize::from(one.is_negated)));
+            }
+            for &number in &group {
+                self.predicates[number].stratum = stratum;
+            }
+            if stratum != NO_STRATUM {
+                highest = highest.max(stratum);
+            }
+        }
+        self.strata = highest + 1;
+        self.is_stratified = true;
+    }
+
+    /// Returns the predicates that the rules of a predicate use.
+    fn uses(&self, number: usize) -> Vec<Use> {
+        let mut uses = Vec::new();
+        for rule in &self.predicates[number].rules {
+            self.add_uses(&rule.body, false, &mut uses);
+        }
+        uses.sort_unstable();
+        uses.dedup();
+        uses
+    }
+
+    fn add_uses(&self, formula: &Formula, is_negated: bool, uses: &mut Vec<Use>) {
         match formula {
             Formula::Pattern(pattern) => {
-                let strata = self.matching(pattern).map(|number| self.predicates[number].stratum);
-                strata.map(|stratum| stratum.saturating_add(above)).max().unwrap_or(0)
+                uses.extend(self.matching(pattern).map(|predicate| Use { predicate, is_negated }));
             }
             Formula::And(parts) | Formula::Or(parts, ..) => {
-                parts.iter().map(|part| self.least_stratum(part, above)).max().unwrap_or(0)
+                parts.iter().for_each(|part| self.add_uses(part, is_negated, uses));
             }
-            Formula::Not(inside) => self.least_stratum(inside, 1),
-            Formula::Test(_) => 0,
+            Formula::Not(inside) => self.add_uses(inside, true, uses),
+            Formula::Test(_) => {}
         }
     }
 
     /// Returns the predicates that a pattern may match. A pattern whose tail is a variable matches facts
     /// only.
     pub(super) fn matching(&self, pattern: &Pattern) -> impl Iterator<Item = usize> {
-        let (width, is_closed) = (pattern.arguments.len(), pattern.tail == Term::NIL);
-        let functor = pattern.functor;
-        let fits = move |(_, predicate): &(usize, &Predicate)| {
-            is_closed
-                && predicate.width == width
-                && (functor.as_variable().is_some() || predicate.functor == functor)
+        let (width, functor) = (pattern.arguments.len(), pattern.functor);
+        let is_closed = pattern.tail == Term::NIL;
+        let (one, several) = match functor.as_variable() {
+            _ if !is_closed => (None, None),
+            Some(_) => (None, self.by_width.get(&width)),
+            None => (self.by_name.get(&(functor.bits(), width)), None),
         };
-        self.predicates.iter().enumerate().filter(fits).map(|(number, _)| number)
+        one.into_iter().chain(several.into_iter().flatten()).copied()
     }
+}
+
+/// The use of a predicate in rules of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Use {
+    predicate: usize,
+    is_negated: bool,
+}
+
+/// Returns the predicates in groups that depend on each other, each group after those that it uses.
+///
+/// Source: Tarjan 1972, with an explicit stack.
+fn groups(uses: &[Vec<Use>]) -> Vec<Vec<usize>> {
+    const UNSEEN: usize = usize::MAX;
+    let mut index = vec![UNSEEN; uses.len()];
+    let mut low = vec![UNSEEN; uses.len()];
+    let mut is_open = vec![false; uses.len()];
+    let (mut stack, mut found, mut next) = (Vec::new(), Vec::new(), 0);
+    for root in 0..uses.len() {
+        if index[root] != UNSEEN {
+            continue;
+        }
+        // Predicates on the way from the root, each with the number of its uses that were followed.
+        let mut path = vec![(root, 0)];
+        while let Some((number, followed)) = path.last_mut() {
+            let number = *number;
+            if *followed == 0 && index[number] == UNSEEN {
+                index[number] = next;
+                low[number] = next;
+                next += 1;
+                stack.push(number);
+                is_open[number] = true;
+            }
+            if let Some(used) = uses[number].get(*followed) {
+                *followed += 1;
+                let used = used.predicate;
+                if index[used] == UNSEEN {
+                    path.push((used, 0));
+                } else if is_open[used] {
+                    low[number] = low[number].min(index[used]);
+                }
+                continue;
+            }
+            path.pop();
+            if let Some(&(user, _)) = path.last() {
+                low[user] = low[user].min(low[number]);
+            }
+            if low[number] == index[number] {
+                let start = stack.iter().rposition(|&other| other == number).unwrap_or(0);
+                let group = stack.split_off(start);
+                group.iter().for_each(|&member| is_open[member] = false);
+                found.push(group);
+            }
+        }
+    }
+    found
 }

@@ -8,6 +8,7 @@ use smallvec::SmallVec;
 
 use super::Database;
 use super::bucket::NONE;
+use super::effort::Effort;
 use super::formula::Pattern;
 use super::query::{Query, QueryError};
 use super::relation::{Access, INDEXED_POSITIONS};
@@ -45,10 +46,10 @@ impl RelationScan {
         &mut self,
         database: &mut Database,
         query: &mut Query,
-        work: &mut usize,
+        effort: &mut Effort,
     ) -> Result<Option<(u32, u32)>, QueryError> {
         while !self.is_opened {
-            if !self.open(database, query, work)? {
+            if !self.open(database, query, effort)? {
                 return Ok(None);
             }
         }
@@ -61,13 +62,12 @@ impl RelationScan {
                 self.heads.push(Reverse((facts.born(after), number, after)));
             }
             let trail = query.trail.len();
-            if facts.is_visible(row, query.time) && self.matches(database, query, number, row)? {
+            if facts.is_visible(row, query.time) && self.matches(database, query, number, row, effort)? {
                 return Ok(Some((number, row)));
             }
             query.undo(trail);
-            match work.checked_sub(1) {
-                Some(left) => *work = left,
-                None => return Ok(None),
+            if !effort.take_item() {
+                return Ok(None);
             }
         }
         Ok(None)
@@ -78,18 +78,20 @@ impl RelationScan {
         &mut self,
         database: &mut Database,
         query: &mut Query,
-        work: &mut usize,
+        effort: &mut Effort,
     ) -> Result<bool, QueryError> {
         let number = self.opening;
         let Some(facts) = database.relations.get(number as usize) else {
             self.is_opened = true;
             return Ok(true);
         };
-        let Some(left) = work.checked_sub(1) else { return Ok(false) };
-        *work = left;
+        if !effort.take_item() {
+            return Ok(false);
+        }
         let arguments = &self.pattern.arguments;
         let is_open = self.pattern.tail != Term::NIL;
-        let functor = database.terms.instantiate(self.pattern.functor, &query.bindings, &mut query.held)?;
+        let Query { bindings, held, .. } = query;
+        let functor = database.terms.instantiate(self.pattern.functor, bindings, held, effort)?;
         let fits = match functor {
             Some(functor) => facts.functor == functor,
             None => true,
@@ -100,9 +102,10 @@ impl RelationScan {
             return Ok(true);
         }
         let mut key: SmallVec<[Term; 8]> = SmallVec::from_elem(Term::UNBOUND, facts.width);
+        effort.spend_cells(facts.width);
         let (mut bound, mut known) = (0_u64, 0);
         for (position, &argument) in arguments.iter().enumerate() {
-            if let Some(term) = database.terms.instantiate(argument, &query.bindings, &mut query.held)? {
+            if let Some(term) = database.terms.instantiate(argument, bindings, held, effort)? {
                 key[position] = term;
                 known += 1;
                 if position < INDEXED_POSITIONS {
@@ -111,9 +114,9 @@ impl RelationScan {
             }
         }
         let facts = &mut database.relations[number as usize];
-        match facts.access(bound, known == facts.width, &key, query.time) {
+        match facts.access(bound, known == facts.width, &key, query.time, effort) {
             Access::Nothing => {}
-            Access::Build(index) => return Ok(facts.build(index, work)),
+            Access::Build(index) => return Ok(facts.build(index, effort)),
             // The chain continues after this row, but only with rows that do not match.
             Access::One(row) => self.begin(facts.born(row), number, row, None),
             Access::Chain(index, row) => self.begin(facts.born(row), number, row, index),
@@ -133,17 +136,19 @@ impl RelationScan {
         query: &mut Query,
         relation: u32,
         row: u32,
+        effort: &mut Effort,
     ) -> Result<bool, QueryError> {
         let Database { relations, terms, .. } = database;
         let facts = &relations[relation as usize];
         let cells = facts.row(row);
         let Query { bindings, trail, held, .. } = query;
         let arguments = &self.pattern.arguments;
-        if !terms.matches(self.pattern.functor, facts.functor, bindings, trail) {
+        effort.spend_cells(cells.len());
+        if !terms.matches(self.pattern.functor, facts.functor, bindings, trail, effort) {
             return Ok(false);
         }
         for (&argument, &cell) in arguments.iter().zip(cells) {
-            if !terms.matches(argument, cell, bindings, trail) {
+            if !terms.matches(argument, cell, bindings, trail, effort) {
                 return Ok(false);
             }
         }
@@ -152,6 +157,6 @@ impl RelationScan {
         }
         let rest = terms.list(&cells[arguments.len()..], Term::NIL)?;
         held.push(rest);
-        Ok(terms.matches(self.pattern.tail, rest, bindings, trail))
+        Ok(terms.matches(self.pattern.tail, rest, bindings, trail, effort))
     }
 }

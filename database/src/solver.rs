@@ -17,6 +17,7 @@
 use smallvec::SmallVec;
 
 use super::Database;
+use super::effort::{Effort, ITEM};
 use super::formula::Pattern;
 use super::plan::{Goal, GoalId};
 use super::query::{AgendaItem, Progress, Query, QueryError, Sink, test_bindings};
@@ -24,8 +25,8 @@ use super::relation::{Access, INDEXED_POSITIONS};
 use super::scan::RelationScan;
 use super::term::Term;
 
-/// Least work of a step; with less, some goals would make no progress.
-const LEAST_WORK: usize = 4;
+/// Least effort of a step; with less, some goals would make no progress.
+const LEAST: usize = 4 * ITEM;
 
 /// Goal at the end of a query or rule.
 pub(super) const SOLVED: GoalId = 0;
@@ -86,21 +87,26 @@ pub(super) enum Choice {
 }
 
 impl Query {
-    /// Runs until all answers are found, a test is requested, or the work is used up.
-    pub(super) fn step(&mut self, database: &mut Database, work: &mut usize) -> Result<Progress, QueryError> {
+    /// Runs until all answers are found, a test is requested, or the effort is used up.
+    pub(super) fn step(
+        &mut self,
+        database: &mut Database,
+        effort: &mut Effort,
+    ) -> Result<Progress, QueryError> {
         // Each step makes progress.
-        *work = (*work).max(LEAST_WORK);
+        effort.allow(LEAST);
         loop {
-            let Some(left) = work.checked_sub(1) else { return Ok(Progress::More) };
-            *work = left;
+            if !effort.take_item() {
+                return Ok(Progress::More);
+            }
             match self.state {
                 SolverState::Goal(goal) => {
-                    if let Some(progress) = self.run_goal(database, goal, work)? {
+                    if let Some(progress) = self.run_goal(database, goal, effort)? {
                         return Ok(progress);
                     }
                 }
                 SolverState::Back => {
-                    if !self.go_back(database, work)? {
+                    if !self.go_back(database, effort)? {
                         return Ok(Progress::More);
                     }
                 }
@@ -110,10 +116,11 @@ impl Query {
                         Sink::Rule(_, rule) => &rule.names,
                         _ => &self.names,
                     };
+                    effort.spend_cells(test.variables.len());
                     return Ok(Progress::Test(test.function, test_bindings(test, names, &self.bindings)));
                 }
                 SolverState::Done => {
-                    let done = self.put_into_order(work);
+                    let done = self.put_into_order(effort);
                     return Ok(if done { Progress::Done } else { Progress::More });
                 }
             }
@@ -133,7 +140,7 @@ impl Query {
         &mut self,
         database: &mut Database,
         goal: GoalId,
-        work: &mut usize,
+        effort: &mut Effort,
     ) -> Result<Option<Progress>, QueryError> {
         match &self.goals[goal as usize] {
             Goal::Match { pattern, relation, next } => {
@@ -141,7 +148,7 @@ impl Query {
                 match *relation {
                     Some(relation) => {
                         let pattern = pattern.clone();
-                        return self.find_rows(database, &pattern, relation, next, work);
+                        return self.find_rows(database, &pattern, relation, next, effort);
                     }
                     None if pattern.functor.as_variable().is_none() && pattern.tail == Term::NIL => {
                         self.state = SolverState::Back;
@@ -155,7 +162,7 @@ impl Query {
             }
             Goal::Call { pattern, predicate, next } => {
                 let (pattern, predicate, next) = (pattern.clone(), *predicate, *next);
-                self.call(database, &pattern, predicate, next)?;
+                self.call(database, &pattern, predicate, next, effort)?;
             }
             Goal::Branch { .. } => {
                 self.choices.push(Choice::Branch { goal, at: 0, trail: self.trail.len() });
@@ -177,7 +184,7 @@ impl Query {
             }
             Goal::Test { .. } => self.state = SolverState::Testing(goal),
             Goal::Solved => {
-                self.solved(database)?;
+                self.solved(database, effort)?;
                 self.state = SolverState::Back;
             }
         }
@@ -214,15 +221,16 @@ impl Query {
         pattern: &Pattern,
         relation: u32,
         next: GoalId,
-        work: &mut usize,
+        effort: &mut Effort,
     ) -> Result<Option<Progress>, QueryError> {
         let width = pattern.arguments.len();
+        effort.spend_cells(width);
         let mut key: SmallVec<[Term; 8]> = SmallVec::from_elem(Term::UNBOUND, width);
         let first_operation = self.operations.len();
         let (mut bound, mut known, mut is_flat) = (0_u64, 0, true);
         for (position, &argument) in pattern.arguments.iter().enumerate() {
             let at = position as u32;
-            match database.terms.instantiate(argument, &self.bindings, &mut self.held)? {
+            match database.terms.instantiate(argument, &self.bindings, &mut self.held, effort)? {
                 Some(term) => {
                     key[position] = term;
                     known += 1;
@@ -232,7 +240,7 @@ impl Query {
                     self.operations.push(MatchOperation::Same(at, term));
                 }
                 None => match argument.as_variable() {
-                    Some(variable) if is_flat && !pattern.arguments[..position].contains(&argument) => {
+                    Some(variable) if is_flat && position < pattern.first_repeated => {
                         self.operations.push(MatchOperation::Bind(at, variable as u32));
                     }
                     _ => {
@@ -243,7 +251,8 @@ impl Query {
                 },
             }
         }
-        let access = database.relations[relation as usize].access(bound, known == width, &key, self.time);
+        let facts = &mut database.relations[relation as usize];
+        let access = facts.access(bound, known == width, &key, self.time, effort);
         let (index, row) = match access {
             Access::Nothing => {
                 self.operations.truncate(first_operation);
@@ -253,7 +262,7 @@ impl Query {
             Access::Build(index) => {
                 self.operations.truncate(first_operation);
                 // Afterwards the goal is run again.
-                let done = database.relations[relation as usize].build(index, work);
+                let done = database.relations[relation as usize].build(index, effort);
                 return Ok(if done { None } else { Some(Progress::More) });
             }
             Access::One(row) => {
@@ -274,9 +283,9 @@ impl Query {
             rank: pattern.rank,
             next,
         };
-        // Its first fact is searched for at once; if the work is used up on the way, the choice remains.
+        // Its first fact is searched for at once; if the effort is used up on the way, the choice remains.
         self.state = SolverState::Back;
-        let goes_on = self.next_row(database, choice, work);
+        let goes_on = self.next_row(database, choice, effort);
         Ok(if goes_on { None } else { Some(Progress::More) })
     }
 
@@ -287,21 +296,21 @@ impl Query {
         }
     }
 
-    /// Returns to the latest choice. The result is false if the work is used up on the way.
-    fn go_back(&mut self, database: &mut Database, work: &mut usize) -> Result<bool, QueryError> {
+    /// Returns to the latest choice. The result is false if the effort is used up on the way.
+    fn go_back(&mut self, database: &mut Database, effort: &mut Effort) -> Result<bool, QueryError> {
         if let Some(Choice::Table { .. }) = self.choices.last() {
-            self.next_table_answer();
+            self.next_table_answer(effort);
             return Ok(true);
         }
         let Some(choice) = self.choices.pop() else {
-            self.next_work(database)?;
+            self.next_work(database, effort)?;
             return Ok(true);
         };
         match choice {
-            Choice::Rows { .. } => return Ok(self.next_row(database, choice, work)),
+            Choice::Rows { .. } => return Ok(self.next_row(database, choice, effort)),
             Choice::Scan { mut scan, trail, next } => {
                 self.undo(trail);
-                let found = scan.next(database, self, work)?;
+                let found = scan.next(database, self, effort)?;
                 let is_unfinished = found.is_none() && !scan.is_exhausted();
                 if let Some((relation, row)) = found {
                     let born = database.relations[relation as usize].born(row);
@@ -327,6 +336,7 @@ impl Query {
                 self.state = SolverState::Goal(alternative);
                 if self.is_reordered && self.sink == 0 {
                     let ranks = rank.min(self.keys.len())..ranks_end.min(self.keys.len());
+                    effort.spend_cells(ranks.len());
                     self.keys[ranks].fill(0);
                     self.set_key(rank, at as u64);
                 }
@@ -338,6 +348,8 @@ impl Query {
                     self.state = SolverState::Goal(next);
                 } else if !self.doubt() {
                     let continuation = self.continuation(goal);
+                    effort.spend_cells(self.bindings.len());
+                    self.waiting_bytes += continuation.bytes();
                     self.set_aside(AgendaItem::Resume(continuation), self.stratum);
                 }
             }
@@ -357,7 +369,7 @@ impl Query {
         false
     }
 
-    fn next_row(&mut self, database: &mut Database, choice: Choice, work: &mut usize) -> bool {
+    fn next_row(&mut self, database: &mut Database, choice: Choice, effort: &mut Effort) -> bool {
         let Choice::Rows { relation, index, mut row, operations, trail, rank, next } = choice else {
             unreachable!("rows")
         };
@@ -365,11 +377,10 @@ impl Query {
         self.undo(trail);
         let facts = &database.relations[relation as usize];
         while row != super::bucket::NONE {
-            let Some(left) = work.checked_sub(1) else {
+            if !effort.take_item() {
                 self.choices.push(again(row));
                 return false;
-            };
-            *work = left;
+            }
             let after = facts.after(index, row);
             let born = facts.born(row);
             if born > self.time {
@@ -379,18 +390,19 @@ impl Query {
             if facts.is_visible(row, self.time) {
                 let cells = facts.row(row);
                 let Query { operations: all, bindings, trail: bound, .. } = self;
-                let matches = all[operations..].iter().all(|operation| match *operation {
-                    MatchOperation::Same(at, term) => cells[at as usize] == term,
+                let differs = all[operations..].iter().position(|operation| match *operation {
+                    MatchOperation::Same(at, term) => cells[at as usize] != term,
                     MatchOperation::Bind(at, variable) => {
                         bindings[variable as usize] = cells[at as usize];
                         bound.push(variable);
-                        true
+                        false
                     }
                     MatchOperation::Match(at, pattern) => {
-                        database.terms.matches(pattern, cells[at as usize], bindings, bound)
+                        !database.terms.matches(pattern, cells[at as usize], bindings, bound, effort)
                     }
                 });
-                if matches {
+                effort.spend_cells(differs.unwrap_or(cells.len()));
+                if differs.is_none() {
                     self.matched_row(relation, row, rank, born);
                     self.state = SolverState::Goal(next);
                     if after == super::bucket::NONE {

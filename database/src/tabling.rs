@@ -2,13 +2,14 @@
 //!
 //! See `solver` for how goals and tables work together.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use smallvec::SmallVec;
 
 use super::Database;
 use super::bucket::{finish, mix};
+use super::effort::Effort;
 use super::formula::Pattern;
 use super::plan::{Goal, GoalId, Planner};
 use super::query::{AgendaItem, Answers, Consumer, Continuation, Query, QueryError, Sink};
@@ -17,6 +18,11 @@ use super::rule::{NO_STRATUM, Predicate, Rule};
 use super::solver::{Choice, SOLVED, SolverState};
 use super::term::Term;
 use super::tuple::Tuples;
+
+/// Number of variables of a call up to which they are searched for one by one.
+const FEW_VARIABLES: usize = 8;
+/// Bytes that a table takes besides its call and its answers: its destinations and the goal of its facts.
+const TABLE_BYTES: usize = 256;
 
 impl Query {
     pub(super) fn continuation(&self, goal: GoalId) -> Continuation {
@@ -52,6 +58,7 @@ impl Query {
         pattern: &Pattern,
         predicate: usize,
         next: GoalId,
+        effort: &mut Effort,
     ) -> Result<(), QueryError> {
         self.state = SolverState::Back;
         let Predicate { functor, width, stratum, .. } = &self.rules.predicates[predicate];
@@ -62,18 +69,28 @@ impl Query {
         // A pattern whose functor is a variable matches this predicate if the variable can be its functor.
         let before = self.trail.len();
         let Query { bindings, held, trail, .. } = self;
-        if !database.terms.matches(pattern.functor, functor, bindings, trail) {
+        if !database.terms.matches(pattern.functor, functor, bindings, trail, effort) {
             self.undo(before);
             return Ok(());
         }
         let mut variables: SmallVec<[u32; 4]> = SmallVec::new();
+        let mut numbers: BTreeMap<usize, usize> = BTreeMap::new();
         let mut number = |variable: usize| {
-            let known = variables.iter().position(|&other| other as usize == variable);
+            let known = match variables.len() {
+                ..=FEW_VARIABLES => variables.iter().position(|&other| other as usize == variable),
+                _ => numbers.get(&variable).copied(),
+            };
             known.unwrap_or_else(|| {
                 variables.push(variable as u32);
+                if variables.len() > FEW_VARIABLES {
+                    let all = variables.iter().enumerate();
+                    let missing = all.skip(numbers.len()).map(|(at, &variable)| (variable as usize, at));
+                    numbers.extend(missing);
+                }
                 variables.len() - 1
             })
         };
+        effort.spend_cells(2 * width);
         let mut call = Vec::with_capacity(width);
         for &argument in &pattern.arguments {
             if database.terms.is_ground(argument) {
@@ -85,14 +102,14 @@ impl Query {
                 call.push(if term.is_unbound() { Term::variable(number(variable) as u32) } else { term });
                 continue;
             }
-            let part = database.terms.rebuild(argument, held, &mut |variable| {
+            let part = database.terms.rebuild(argument, held, effort, &mut |variable| {
                 let term = bindings[variable];
                 Some(if term.is_unbound() { Term::variable(number(variable) as u32) } else { term })
             })?;
             call.push(part.unwrap_or(Term::NIL));
         }
         let table = self.table(predicate, call, variables.len());
-        self.consume(table, variables, pattern.rank, next, before);
+        self.consume(table, variables, pattern.rank, next, before, effort);
         Ok(())
     }
 
@@ -111,6 +128,7 @@ impl Query {
         by_call.add(table, hash);
         let stratum = self.rules.predicates[predicate].stratum;
         let tuples = Tuples::new(width);
+        self.table_bytes += size_of::<Answers>() + 16 * call.len() + TABLE_BYTES;
         self.tables.push(Answers { predicate, call, stratum, width, tuples, idle: Vec::new() });
         self.set_aside(AgendaItem::Expand { table, rule: 0 }, stratum);
         table
@@ -125,6 +143,7 @@ impl Query {
         rank: usize,
         next: GoalId,
         before: usize,
+        effort: &mut Effort,
     ) {
         if self.is_complete(table) {
             // The functor may have been bound just now; returning to an earlier choice undoes that.
@@ -137,6 +156,8 @@ impl Query {
             return;
         }
         let continuation = self.continuation(next);
+        effort.spend_cells(self.bindings.len());
+        self.waiting_bytes += size_of::<Consumer>() + continuation.bytes() + 4 * variables.len();
         self.undo(before);
         let consumer = self.consumers.len() as u32;
         self.consumers.push(Consumer { table, at: 0, variables, continuation, rank });
@@ -149,7 +170,7 @@ impl Query {
     }
 
     /// Continues with the next answer of the table of the latest choice.
-    pub(super) fn next_table_answer(&mut self) {
+    pub(super) fn next_table_answer(&mut self, effort: &mut Effort) {
         let Query { choices, tables, consumers, bindings, trail: bound, .. } = self;
         let Some(Choice::Table { table, at, variables, consumer, trail, rank, next }) = choices.last_mut()
         else {
@@ -168,6 +189,7 @@ impl Query {
             return;
         }
         let answer = tuples.get(*at);
+        effort.spend_cells(variables.len());
         // An answer has a value for each of the variables.
         for (position, &variable) in variables.iter().enumerate() {
             bindings[variable as usize] = answer[position];
@@ -180,7 +202,11 @@ impl Query {
     }
 
     /// Takes up the next piece of work, from the lowest stratum that has some.
-    pub(super) fn next_work(&mut self, database: &mut Database) -> Result<(), QueryError> {
+    pub(super) fn next_work(
+        &mut self,
+        database: &mut Database,
+        effort: &mut Effort,
+    ) -> Result<(), QueryError> {
         self.trail.clear();
         self.operations.clear();
         let next = self.agenda.iter_mut().find_map(VecDeque::pop_front);
@@ -189,12 +215,13 @@ impl Query {
             return Ok(());
         };
         match work {
-            AgendaItem::Expand { table, rule } => self.expand(database, table, rule)?,
+            AgendaItem::Expand { table, rule } => self.expand(database, table, rule, effort)?,
             AgendaItem::Feed(number) => {
                 let consumer = &self.consumers[number as usize];
                 let (table, at, rank) = (consumer.table, consumer.at, consumer.rank);
                 let variables = consumer.variables.clone();
                 let continuation = consumer.continuation.clone();
+                effort.spend_cells(2 * continuation.bindings.len() + continuation.keys.len());
                 let next = continuation.goal;
                 self.resume(continuation);
                 self.state = SolverState::Back;
@@ -203,6 +230,8 @@ impl Query {
             }
             AgendaItem::Resume(continuation) => {
                 let goal = continuation.goal;
+                effort.spend_cells(continuation.bindings.len());
+                self.waiting_bytes -= continuation.bytes();
                 self.resume(continuation);
                 self.state = SolverState::Goal(goal);
             }
@@ -221,16 +250,23 @@ impl Query {
     }
 
     /// Begins to find the answers of a table: from its facts first, then from one rule after the other.
-    fn expand(&mut self, database: &mut Database, table: u32, rule: usize) -> Result<(), QueryError> {
+    fn expand(
+        &mut self,
+        database: &mut Database,
+        table: u32,
+        rule: usize,
+        effort: &mut Effort,
+    ) -> Result<(), QueryError> {
         let answers = &self.tables[table as usize];
         let (stratum, predicate) = (answers.stratum, answers.predicate);
         let call = answers.call.clone();
         let width = answers.width;
+        effort.spend_cells(2 * call.len());
         let Predicate { functor, rules, .. } = &self.rules.predicates[predicate];
         self.stratum = stratum;
         self.state = SolverState::Back;
         if rule == 0 {
-            let pattern = Pattern { rank: 0, functor: *functor, arguments: call.into(), tail: Term::NIL };
+            let pattern = Pattern::new(0, *functor, call.into(), Term::NIL);
             self.set_aside(AgendaItem::Expand { table, rule: 1 }, stratum);
             let Some(relation) = database.find_relation(pattern.functor, pattern.arguments.len()) else {
                 return Ok(());
@@ -250,6 +286,7 @@ impl Query {
         }
         self.bindings.clear();
         self.bindings.resize(found.names.len(), Term::UNBOUND);
+        effort.spend_cells(found.names.len());
         let mut given = 0_u64;
         for (position, (&head, &part)) in found.head.arguments.iter().zip(&call).enumerate() {
             if !database.terms.is_ground(part) {
@@ -258,12 +295,12 @@ impl Query {
             if position < INDEXED_POSITIONS {
                 given |= 1 << position;
             }
-            if !database.terms.matches(head, part, &mut self.bindings, &mut self.trail) {
+            if !database.terms.matches(head, part, &mut self.bindings, &mut self.trail, effort) {
                 return Ok(());
             }
         }
         self.sink = self.sinks.len() as u32;
-        let start = self.rule_start(database, predicate, rule - 1, given, &found);
+        let start = self.rule_start(database, predicate, rule - 1, given, &found, effort);
         self.sinks.push(Sink::Rule(table, found));
         self.state = SolverState::Goal(start);
         Ok(())
@@ -277,6 +314,7 @@ impl Query {
         number: usize,
         given: u64,
         rule: &Arc<Rule>,
+        effort: &mut Effort,
     ) -> GoalId {
         if let Some(&start) = self.rule_goals.get(&(predicate, number, given)) {
             return start;
@@ -286,16 +324,19 @@ impl Query {
         let mut planner =
             Planner { database, rules: &rules, goals: &mut self.goals, is_reordered: false, work: 0 };
         let start = planner.plan(&rule.body, &mut bound, SOLVED);
+        // As much as for the planning of a query.
+        effort.spend(4 * planner.work);
+        self.table_bytes += 16 * planner.work;
         self.rule_goals.insert((predicate, number, given), start);
         start
     }
 
     /// Handles an answer.
-    pub(super) fn solved(&mut self, database: &mut Database) -> Result<(), QueryError> {
+    pub(super) fn solved(&mut self, database: &mut Database, effort: &mut Effort) -> Result<(), QueryError> {
         let Query { sinks, sink, tables, bindings, held, .. } = self;
         let (table, rule) = match &sinks[*sink as usize] {
             Sink::Query => {
-                self.answer();
+                self.answer(effort);
                 return Ok(());
             }
             Sink::Facts(table) => (*table, None),
@@ -303,6 +344,7 @@ impl Query {
         };
         let Answers { call, tuples, width, .. } = &mut tables[table as usize];
         let width = *width;
+        effort.spend_cells(2 * call.len());
         let is_new = match rule {
             None => tuples.insert(bindings[..width].iter().copied()),
             Some(rule) => {
@@ -312,14 +354,14 @@ impl Query {
                     if database.terms.is_ground(part) {
                         continue;
                     }
-                    let Some(term) = database.terms.instantiate(head, bindings, held)? else {
+                    let Some(term) = database.terms.instantiate(head, bindings, held, effort)? else {
                         return Err(QueryError::Unbound(rule.head.functor));
                     };
                     if let Some(place) = part.as_variable().map(|variable| &mut values[variable])
                         && place.is_unbound()
                     {
                         *place = term;
-                    } else if !database.terms.matches(part, term, &mut values, &mut bound) {
+                    } else if !database.terms.matches(part, term, &mut values, &mut bound, effort) {
                         return Ok(());
                     }
                 }

@@ -47,6 +47,7 @@ pub fn same(heap: &Heap, test: KeyTest, a: Value, b: Value, work: &mut usize) ->
 fn walk(heap: &Heap, loosely: bool, a: Value, b: Value, work: &mut usize) -> Option<bool> {
     let mut open: SmallVec<[(Value, Value); 16]> = smallvec![(a, b)];
     while let Some((a, b)) = open.pop() {
+        *work = work.checked_sub(number_work(heap, a))?;
         if number::eql(heap, a, b) {
             continue;
         }
@@ -59,6 +60,7 @@ fn walk(heap: &Heap, loosely: bool, a: Value, b: Value, work: &mut usize) -> Opt
         let is_same = if loosely {
             loosely_same(heap, a, b, &mut open, work)?
         } else if let (Some(left), Some(right)) = (heap.value_slots(a), heap.value_slots(b)) {
+            *work = work.checked_sub(left.len())?;
             open.extend(left.iter().copied().zip(right.iter().copied()));
             heap.structure_class(a) == heap.structure_class(b)
         } else {
@@ -197,41 +199,70 @@ pub fn fixnum_hash(n: i64) -> u32 {
     group << 4 | (n as u32 ^ group >> 28) & 15
 }
 
+/// Limbs of a number, and pairs of characters of a string, that are hashed or compared for a unit of work.
+const WORDS_TO_A_UNIT: usize = 64;
+
+/// Returns the work of comparing or hashing a number.
+#[inline]
+fn number_work(heap: &Heap, v: Value) -> usize {
+    match heap.bignum(v) {
+        Some(n) => n.limbs.len() / WORDS_TO_A_UNIT,
+        None => 0,
+    }
+}
+
+/// Returns a hash of `v` that agrees with `test`, and the work of finding it: nothing for small objects.
+#[inline]
+pub fn hash_with_work(heap: &Heap, test: KeyTest, v: Value) -> (u32, usize) {
+    match v.as_fixnum() {
+        Some(n) if test != KeyTest::Equalp => (fixnum_hash(n), 0),
+        _ => other_hash(heap, test, v),
+    }
+}
+
 /// Returns a hash of `v` that agrees with `test`.
 #[inline(always)]
 pub fn hash(heap: &Heap, test: KeyTest, v: Value) -> u32 {
     match v.as_fixnum() {
         Some(n) if test != KeyTest::Equalp => fixnum_hash(n),
-        _ => other_hash(heap, test, v),
+        _ => other_hash(heap, test, v).0,
     }
 }
 
-/// Returns a hash of a value that is not a fixnum, or is compared by `equalp`.
-fn other_hash(heap: &Heap, test: KeyTest, v: Value) -> u32 {
+/// Returns a hash of a value that is not a fixnum, or is compared by `equalp`, and the work of finding it.
+fn other_hash(heap: &Heap, test: KeyTest, v: Value) -> (u32, usize) {
     if test == KeyTest::Equal
         && let Some(characters) = heap.string(v)
     {
-        return finish(mix(0, characters_hash(characters, false)));
+        return (finish(mix(0, characters_hash(characters, false))), characters_work(characters));
     }
     if !v.is_address() && test != KeyTest::Equalp {
-        return finish(mix(0, v.bits()));
+        return (finish(mix(0, v.bits())), 0);
     }
     let word = match test {
         KeyTest::Eq => heap.identity(v),
         KeyTest::Eql => number_hash(heap, v).unwrap_or_else(|| heap.identity(v)),
-        KeyTest::Equal => return finish(parts_hash(heap, v, false)),
-        KeyTest::Equalp => return finish(parts_hash(heap, v, true)),
+        KeyTest::Equal | KeyTest::Equalp => {
+            let mut work = 0;
+            let word = parts_hash(heap, v, test == KeyTest::Equalp, &mut work);
+            return (finish(word), work);
+        }
     };
-    finish(mix(0, word))
+    (finish(mix(0, word)), number_work(heap, v))
 }
 
 /// Returns the value of `sxhash`: the hash of `equal`, but for a symbol one that depends on its name alone,
-/// so that it is the same in every run.
-pub fn sxhash(heap: &Heap, v: Value) -> u32 {
+/// so that it is the same in every run; and the work of finding it.
+pub fn sxhash(heap: &Heap, v: Value) -> (u32, usize) {
     match heap.symbol(v).and_then(|symbol| heap.string(symbol.name)) {
-        Some(name) => finish(characters_hash(name, false)),
-        None => hash(heap, KeyTest::Equal, v),
+        Some(name) => (finish(characters_hash(name, false)), characters_work(name)),
+        None => hash_with_work(heap, KeyTest::Equal, v),
     }
+}
+
+/// Returns the work of hashing characters.
+fn characters_work(characters: &[u32]) -> usize {
+    (characters.len() / 2).min(2 * HASHED_CHARACTERS) / WORDS_TO_A_UNIT
 }
 
 /// Returns a hash word that equal numbers of one type share; `None` if `v` is not a boxed number.
@@ -283,8 +314,8 @@ fn characters_hash(characters: &[u32], loosely: bool) -> u64 {
 }
 
 /// Returns the hash word of a pair or string, or if `loosely` of an array or structure, from its first parts
-/// in reading order.
-fn parts_hash(heap: &Heap, v: Value, loosely: bool) -> u64 {
+/// in reading order. Adds the work to `work`.
+fn parts_hash(heap: &Heap, v: Value, loosely: bool, work: &mut usize) -> u64 {
     let mut open: SmallVec<[Value; 16]> = smallvec![v];
     let mut hash = 0;
     let mut visited = 0;
@@ -293,6 +324,9 @@ fn parts_hash(heap: &Heap, v: Value, loosely: bool) -> u64 {
         if visited > HASHED_PARTS {
             break;
         }
+        if loosely {
+            *work += number_work(heap, v);
+        }
         if let Some(pair) = heap.as_cons(v) {
             hash = mix(hash, 5);
             open.push(pair.cdr);
@@ -300,13 +334,16 @@ fn parts_hash(heap: &Heap, v: Value, loosely: bool) -> u64 {
         } else if loosely {
             hash = loose_hash(heap, v, hash, &mut open);
         } else if let Some(characters) = characters_of(heap, v) {
+            *work += characters_work(characters);
             hash = mix(hash, characters_hash(characters, false));
         } else if let Some(bits) = bits_of(heap, v) {
             let shown = bits.iter().take(HASHED_CHARACTERS);
+            *work += shown.len() / WORDS_TO_A_UNIT;
             hash = shown.fold(mix(hash, bits.len() as u64), |hash, &bit| mix(hash, u64::from(bit)));
         } else if let Some(slots) = heap.value_slots(v) {
-            open.extend(slots.iter().rev().copied());
+            open.extend(slots.iter().take(HASHED_PARTS).rev().copied());
         } else {
+            *work += number_work(heap, v);
             hash = mix(hash, number_hash(heap, v).unwrap_or_else(|| heap.identity(v)));
         }
     }

@@ -109,7 +109,10 @@ impl Lookups {
         {
             return Ok(Lookup { place: KeyPlace::Entry(entry, value), steps: 0, way: Way::Guess });
         }
-        search(heap, table, test, key, equality::hash(heap, test, key), Way::Search)
+        let (hash, work) = equality::hash_with_work(heap, test, key);
+        let mut found = search(heap, table, test, key, hash, Way::Search)?;
+        found.steps += work;
+        Ok(found)
     }
 
     /// Notes what a search has found.

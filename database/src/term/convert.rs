@@ -138,7 +138,12 @@ impl Terms {
                             open.push(Open::Record(self.atom_value(heap, class)?));
                             open.push(Open::Make(slots));
                         }
-                        None => made.push(self.atom_value(heap, term)?),
+                        None => {
+                            if let Some(index) = term.0.as_term() {
+                                *work += self.nodes[index as usize].data.work();
+                            }
+                            made.push(self.atom_value(heap, term)?);
+                        }
                     },
                 },
                 Open::Join => {

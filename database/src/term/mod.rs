@@ -101,6 +101,8 @@ pub(crate) struct Terms {
     objects: Value,
     /// Bytes in use, approximately.
     pub(super) bytes: usize,
+    /// Work done for the contents of terms since the last [`Terms::take_work`].
+    work: usize,
 }
 
 /// Bytes of a node without its contents.
@@ -130,6 +132,7 @@ impl Default for Terms {
             unheld: Vec::new(),
             objects: Value::NIL,
             bytes: 0,
+            work: 0,
         }
     }
 }
@@ -138,6 +141,7 @@ impl Terms {
     fn intern(&mut self, hash: u32, data: TermData) -> Term {
         if let Some(found) = self.buckets.find(hash, |other| self.nodes[other as usize].data == data) {
             self.nodes[found as usize].holders += 1;
+            self.work += data.work();
             // A stored term holds its parts once, however often it is made.
             if let Some((left, right)) = data.parts() {
                 self.release(left);
@@ -146,6 +150,7 @@ impl Terms {
             return Term(Value::term(found));
         }
         self.bytes += NODE_BYTES + data.bytes();
+        self.work += data.work();
         let node = TermNode { data, holders: 1 };
         let index = match self.free.pop() {
             Some(index) => {
@@ -159,6 +164,11 @@ impl Terms {
         };
         self.buckets.add(index, hash);
         Term(Value::term(index))
+    }
+
+    /// Returns the work done for the contents of terms, such as the characters of strings, since the last call.
+    pub(super) fn take_work(&mut self) -> usize {
+        std::mem::take(&mut self.work)
     }
 
     /// Calls `visit` with words and objects that identify a term in another run, too.
@@ -324,6 +334,11 @@ impl TermData {
             | TermData::Record(left, right) => Some((left, right)),
             _ => None,
         }
+    }
+
+    /// Returns the work of copying or comparing its contents.
+    fn work(&self) -> usize {
+        self.bytes() / 16
     }
 
     fn bytes(&self) -> usize {

@@ -1,5 +1,6 @@
 //! Patterns: terms with variables, matched with terms and filled in.
 
+use super::super::effort::Effort;
 use super::{Term, TermError, Terms};
 
 impl Terms {
@@ -13,6 +14,7 @@ impl Terms {
         pattern: Term,
         bindings: &[Term],
         made: &mut Vec<Term>,
+        effort: &mut Effort,
     ) -> Result<Option<Term>, TermError> {
         if let Some(variable) = pattern.as_variable() {
             let term = bindings[variable];
@@ -21,7 +23,7 @@ impl Terms {
         if self.is_ground(pattern) {
             return Ok(Some(pattern));
         }
-        self.rebuild(pattern, made, &mut |variable| {
+        self.rebuild(pattern, made, effort, &mut |variable| {
             let term = bindings[variable];
             if term.is_unbound() { None } else { Some(term) }
         })
@@ -33,6 +35,7 @@ impl Terms {
         &mut self,
         pattern: Term,
         made: &mut Vec<Term>,
+        effort: &mut Effort,
         replace: &mut dyn FnMut(usize) -> Option<Term>,
     ) -> Result<Option<Term>, TermError> {
         enum Open {
@@ -42,6 +45,7 @@ impl Terms {
         let mut open = vec![Open::Make(pattern)];
         let mut terms: Vec<Term> = Vec::new();
         while let Some(next) = open.pop() {
+            effort.spend(1);
             match next {
                 Open::Make(term) if self.is_ground(term) => terms.push(term),
                 Open::Make(term) => match (term.as_variable(), self.as_pair(term)) {
@@ -76,6 +80,7 @@ impl Terms {
         term: Term,
         bindings: &mut [Term],
         trail: &mut Vec<u32>,
+        effort: &mut Effort,
     ) -> bool {
         if let Some(variable) = pattern.as_variable() {
             let bound = bindings[variable];
@@ -91,6 +96,7 @@ impl Terms {
         }
         let mut open = vec![(pattern, term)];
         while let Some((pattern, term)) = open.pop() {
+            effort.spend(1);
             if let Some(variable) = pattern.as_variable() {
                 let bound = bindings[variable];
                 if bound.is_unbound() {

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 
 use esl_heap::{Heap, Value};
 
-use super::{Database, Progress, Term};
+use super::effort::ITEM;
+use super::{Database, Effort, Progress, Term};
 
 /// A database and a heap, which is never collected, with texts in place of values.
 struct Fixture {
@@ -111,8 +112,7 @@ impl Fixture {
     /// Finds all answers in steps of `portion`; a test holds if the sum of its variables is even.
     fn finish(&mut self, query: u64, portion: usize) -> Vec<String> {
         loop {
-            let mut work = portion;
-            match self.database.step(query, &mut work).unwrap() {
+            match self.database.step(query, &mut Effort::of(portion * ITEM)).unwrap() {
                 Ok(Progress::More) => {}
                 Ok(Progress::Done) => break,
                 Ok(Progress::Test(_, bindings)) => {
@@ -147,7 +147,7 @@ impl Fixture {
         let pattern = self.read(text);
         let heap = &mut self.heap;
         let query = self.database.open(heap, pattern, Value::NIL, true, &mut 0).unwrap();
-        while self.database.step(query, &mut 7) != Some(Ok(Progress::Done)) {}
+        while self.database.step(query, &mut Effort::of(7 * ITEM)) != Some(Ok(Progress::Done)) {}
         let mut all = Vec::new();
         loop {
             let heap = &mut self.heap;
@@ -259,7 +259,7 @@ fn a_query_sees_what_was_there_when_it_began() {
         fixture.assert(&format!("(n {x})"));
     }
     let query = fixture.open("(and (n ?x) (n ?x))");
-    _ = fixture.database.step(query, &mut 5);
+    _ = fixture.database.step(query, &mut Effort::of(5 * ITEM));
     for x in 0..20 {
         fixture.retract(&format!("(n {x})"));
         fixture.assert(&format!("(n {})", x + 100));

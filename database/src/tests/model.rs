@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use proptest::prelude::*;
 
-use super::Fixture;
+use super::{Effort, Fixture, ITEM};
 
 #[derive(Clone, Debug)]
 enum Part {
@@ -176,7 +176,7 @@ proptest! {
         }
         let before = facts.clone();
         let query = fixture.open(&first.text());
-        _ = fixture.database.step(query, &mut portion.clone());
+        _ = fixture.database.step(query, &mut Effort::of(portion * ITEM));
         for (adds, fact) in meanwhile {
             change(&mut fixture, &mut facts, adds, fact);
         }

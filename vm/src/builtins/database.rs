@@ -1,7 +1,7 @@
 //! The logical database: changes of facts, and queries in steps. Whatever calls functions of the program is
 //! ESL, in `stdlib/database.esl`.
 
-use esl_database::{FormulaError, Progress, QueryError};
+use esl_database::{Effort, FormulaError, Progress, QueryError};
 
 use crate::heap::AllocError;
 use crate::raise::{Exit, Outcome, Raised};
@@ -12,8 +12,9 @@ use crate::vm::Vm;
 
 use super::expect::exactly;
 
-/// Work of one step of a query: a fact looked at, a goal, an answer.
-const STEP: usize = 1024;
+/// Units of work of one step of a query: for a fact looked at, a goal, an answer 8 of them, and one for each
+/// further argument.
+const STEP: usize = 8 * 1024;
 
 /// Makes what the database needs of the heap, when it is used first.
 fn prepare(vm: &mut Vm) -> Result<(), Exit> {
@@ -166,22 +167,24 @@ fn open<T>(vm: &mut Vm, found: Option<T>) -> Result<T, Exit> {
 
 pub(super) fn query_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let key = query(vm, arguments[0])?;
-    let mut work = STEP;
-    let progress = vm.database.step(key, &mut work);
-    vm.exchange.charge(8 * (STEP - work));
+    let mut effort = Effort::of(STEP);
+    let progress = vm.database.step(key, &mut effort);
+    vm.exchange.charge(effort.spent());
     // If there is no room, the step is done again and goes on from here.
     vm.database.check_room(&mut vm.heap)?;
     match open(vm, progress)? {
         Ok(Progress::More) => Ok(Value::NIL),
         Ok(Progress::Done) => Ok(Value::T),
         Ok(Progress::Test(function, bindings)) => {
-            let function = vm.database.value(&mut vm.heap, function)?;
+            let mut work = 0;
+            let function = vm.database.value(&mut vm.heap, function, &mut work)?;
             let bindings = bindings.into_iter().rev().try_fold(Value::NIL, |list, (name, value)| {
-                let name = vm.database.value(&mut vm.heap, name)?;
-                let value = vm.database.value(&mut vm.heap, value)?;
+                let name = vm.database.value(&mut vm.heap, name, &mut work)?;
+                let value = vm.database.value(&mut vm.heap, value, &mut work)?;
                 let binding = vm.heap.cons(name, value)?;
                 vm.heap.cons(binding, list)
             });
+            vm.exchange.charge(4 * work);
             let test = vm.names.known.test;
             let bindings: Result<Value, AllocError> = bindings;
             vm.give_values(&[test, function, bindings?])
@@ -194,11 +197,11 @@ pub(super) fn query_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn raise_query_error(vm: &mut Vm, error: QueryError) -> Outcome {
     match error {
         QueryError::Circular(functor) => {
-            let functor = vm.database.value(&mut vm.heap, functor)?;
+            let functor = vm.database.value(&mut vm.heap, functor, &mut 0)?;
             vm.exchange.raise(Raised::Cause("UNSTRATIFIED-RULES", functor))
         }
         QueryError::Unbound(functor) => {
-            let functor = vm.database.value(&mut vm.heap, functor)?;
+            let functor = vm.database.value(&mut vm.heap, functor, &mut 0)?;
             vm.exchange.raise(Raised::Cause("UNBOUND-LOGICAL-VARIABLE", functor))
         }
         QueryError::TooLarge => vm.exchange.program_error("a rule builds too large a term"),
@@ -212,9 +215,9 @@ pub(super) fn begin_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut work = 0;
     let opened = vm.database.open(&mut vm.heap, query, bindings, false, &mut work);
     let key = checked(vm, opened)?;
-    let mut left = STEP;
-    let progress = vm.database.step(key, &mut left);
-    vm.exchange.charge(4 * work + 8 * (STEP - left.min(STEP)));
+    let mut effort = Effort::of(STEP);
+    let progress = vm.database.step(key, &mut effort);
+    vm.exchange.charge(4 * work + effort.spent());
     match progress {
         Some(Ok(Progress::Done)) => {
             let mut work = 0;

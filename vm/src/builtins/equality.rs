@@ -40,5 +40,7 @@ pub(super) fn equalp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn sxhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(Value::index(equality::sxhash(&vm.heap, arguments[0]) as usize))
+    let (hash, work) = equality::sxhash(&vm.heap, arguments[0]);
+    vm.exchange.charge_elements(work);
+    Ok(Value::index(hash as usize))
 }

@@ -40,7 +40,9 @@ fn same(vm: &Vm, test: KeyTest, a: Value, b: Value, work: &mut usize) -> Result<
 fn member(vm: &mut Vm, test: KeyTest, arguments: &[Value]) -> Outcome {
     let item = arguments[0];
     let mut work = LIMIT;
-    find_pair(vm, arguments[1], |vm, candidate| same(vm, test, item, candidate, &mut work))
+    let found = find_pair(vm, arguments[1], |vm, candidate| same(vm, test, item, candidate, &mut work))?;
+    vm.exchange.charge_elements(LIMIT - work);
+    Ok(found)
 }
 
 /// Returns the first pair of an alist whose key, or value, is the same as `item`.
@@ -52,6 +54,7 @@ fn assoc(vm: &mut Vm, test: KeyTest, arguments: &[Value], by_value: bool) -> Out
         None if entry.is_nil() => Ok(false),
         None => vm.exchange.type_error(entry, "LIST"),
     })?;
+    vm.exchange.charge_elements(LIMIT - work);
     Ok(vm.heap.car(found).unwrap_or(Value::NIL))
 }
 

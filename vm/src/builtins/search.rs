@@ -38,6 +38,7 @@ fn position(vm: &mut Vm, test: KeyTest, arguments: &[Value]) -> Outcome {
             }
         }
     }
+    vm.exchange.charge_elements(LIMIT - work);
     Ok(found.map_or(Value::NIL, Value::index))
 }
 

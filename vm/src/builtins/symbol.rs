@@ -31,6 +31,7 @@ fn cell(vm: &mut Vm, v: Value) -> Result<SymbolObject, Exit> {
 /// `type-error` for anything else.
 pub(crate) fn designated_text(vm: &mut Vm, v: Value) -> Result<String, Exit> {
     if let Some(text) = text_of(&vm.heap, v) {
+        vm.exchange.charge(text.len());
         return Ok(text);
     }
     if let Some(code) = v.as_character() {
@@ -250,6 +251,7 @@ pub(super) fn gensym(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 fn named_symbol(vm: &mut Vm, prefix: &str, number: Value) -> Outcome {
     let number = number.as_fixnum().unwrap_or(0);
+    vm.exchange.charge(2 * prefix.len());
     let name = vm.heap.alloc_str(&format!("{prefix}{number}"))?;
     Ok(vm.names.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
 }

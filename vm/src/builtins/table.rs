@@ -108,15 +108,16 @@ pub(super) fn remhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [key, table_value] = exactly(arguments);
     let table = table(vm, table_value)?;
     let KeyComparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
-    let hash = equality::hash(&vm.heap, test, key);
+    let (hash, hashing) = equality::hash_with_work(&vm.heap, test, key);
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, key, hash, &mut work)?;
-    vm.exchange.charge_elements(LIMIT - work);
+    vm.exchange.charge_elements(LIMIT - work + hashing);
     Ok(found.is_some_and(|(entry, _)| table.delete(&mut vm.heap, entry, hash)).into())
 }
 
 pub(super) fn clrhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
+    vm.exchange.charge(table.room(&vm.heap));
     table.clear(&mut vm.heap)?;
     Ok(arguments[0])
 }
@@ -179,7 +180,9 @@ pub(super) fn table_hash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         KeyComparison::Native(test) => test,
         KeyComparison::Program => KeyTest::Equalp,
     };
-    Ok(Value::index(equality::hash(&vm.heap, test, key) as usize))
+    let (hash, work) = equality::hash_with_work(&vm.heap, test, key);
+    vm.exchange.charge_elements(work);
+    Ok(Value::index(hash as usize))
 }
 
 /// Returns the 32 bits of a hash: a fixnum as [`table_hash`] gives it, or any integer of a hash function of
