@@ -228,6 +228,17 @@ impl Engine {
         Ok(())
     }
 
+    /// Has one call at most of an operation be under way, or one for each value of a parameter, as by
+    /// `define-exclusive`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidName`].
+    pub fn make_exclusive(&mut self, name: &str, parameter: Option<&str>) -> Result<(), Error> {
+        check_name(name)?;
+        parameter.map_or(Ok(()), check_name)?;
+        self.eval(&format!("(esl:define-exclusive {name} {})", parameter.unwrap_or_default())).map(drop)
+    }
+
     /// Defines a function of the embedder's, which `make` makes for the variables of its lambda list.
     fn define_by(
         &mut self,
