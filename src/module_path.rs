@@ -22,6 +22,7 @@ use esl_bytecode::file;
 use esl_bytecode::span::SourceId;
 use esl_bytecode::verify::verify;
 use esl_compiler::reader::decode;
+use esl_compiler::similar::is_like;
 #[cfg(feature = "world")]
 use esl_host::Rights;
 use esl_vm::load::LoadError;
@@ -49,6 +50,8 @@ pub enum ModuleError {
         name: String,
         /// Folders that were searched.
         folders: Vec<PathBuf>,
+        /// Name of a module that may be meant.
+        similar: Option<String>,
     },
     /// The file cannot be read.
     Unreadable(PathBuf, std::io::Error),
@@ -65,10 +68,11 @@ impl fmt::Display for ModuleError {
             ModuleError::NotFound { folders, .. } if folders.is_empty() => {
                 f.write_str("no folders to search: name some with `--library`")
             }
-            ModuleError::NotFound { name, folders } => {
+            ModuleError::NotFound { name, folders, similar } => {
                 let folders: Vec<String> =
                     folders.iter().map(|folder| format!("`{}`", folder.display())).collect();
-                write!(f, "`{name}.esl` is not in {}", folders.join(", "))
+                write!(f, "`{name}.esl` is not in {}", folders.join(", "))?;
+                similar.as_ref().map_or(Ok(()), |similar| write!(f, "; did you mean `{similar}`?"))
             }
             ModuleError::Unreadable(path, error) => {
                 write!(f, "`{}` cannot be read: {error}", path.display())
@@ -163,7 +167,8 @@ impl ModulePath {
             let name = format!("{MODULE_SOURCES}{}.esl", name.to_lowercase());
             return Ok(Required::Source { name, text: text.into() });
         }
-        Err(ModuleError::NotFound { name: name.into(), folders: self.folders.clone() })
+        let similar = self.names().into_iter().find(|known| is_like(known, &name.to_lowercase()));
+        Err(ModuleError::NotFound { name: name.into(), folders: self.folders.clone(), similar })
     }
 
     /// Returns the text of the module of this name, if [`find`](Self::find) finds its source.
@@ -210,4 +215,20 @@ fn read_compiled(path: &Path) -> Result<Required, ModuleError> {
     let module = file::read(&read(path)?).map_err(|error| refused(error.into()))?;
     verify(&module).map_err(|error| refused(LoadError::Refused(error)))?;
     Ok(Required::Compiled(Box::new(module)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(feature = "world")]
+    #[test]
+    fn a_misspelt_name_is_answered_with_the_one_that_may_be_meant() {
+        let said =
+            |name: &str| ModulePath::none().find(name).expect_err("there is no such module").to_string();
+        let path = ModulePath::new([Path::new("robot.esl")], &[]);
+        let error = path.find("jsno").expect_err("there is no such module").to_string();
+        assert!(error.ends_with("; did you mean `json`?"), "{error}");
+        assert!(!said("no-such-module").contains("did you mean"));
+    }
 }

@@ -10,6 +10,7 @@ pub mod lower;
 pub mod reader;
 mod resolve;
 pub mod session;
+pub mod similar;
 
 /// The example of the README, compiled and run.
 #[cfg(doctest)]

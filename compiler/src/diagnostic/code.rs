@@ -453,6 +453,12 @@ CONCURRENT_OPERATION = "concurrent-operation" Warning
                (with-guardian (loop until (< *battery* 1) do (sleep 1))\n                (fail :battery-low)\n              \
                (drive 'lab)))\n          'stopped)\n  (drive 'dock))\n"
 
+DUPLICATE_DEFINITION = "duplicate-definition" Warning
+    /// A cause, goal, rule or property that a file defines twice.
+    fails: "(define-cause :stuck ())\n(define-cause :stuck (:general-failure))\n\
+            (with-recovery-procedures ((:stuck (abort)))\n  (fail :stuck))\n"
+    repaired: "(define-cause :stuck ())\n(with-recovery-procedures ((:stuck (abort)))\n  (fail :stuck))\n"
+
 UNDECLARED_CAUSE = "undeclared-cause" Warning
     /// A cause that is not declared, in a program that declares causes.
     fails: "(define-cause :broken ())\n(with-recovery-procedures\n    ((:brocken (abort)))\n  \

@@ -1,20 +1,22 @@
 //! Calls: of local functions, builtins, global functions, and of the value of a form.
 
 use esl_bytecode::builtin::Builtin;
-use esl_bytecode::compile::{Arity, Environment, Global, GlobalFunction, MacroRef};
+use esl_bytecode::compile::{Environment, Global, GlobalFunction, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::symbol::Symbol;
 
 use super::argument::{refused, usage};
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, arguments, constant_value, infix, is_cl_form, is_known, name};
+use super::form::{Checked, Form, Make, arguments, constant_value, infix, is_cl_form, is_known, name, plain};
 use super::function::{FunctionName, WrittenName};
 use super::global::{PendingCall, accepts, is_checked_constant, wrong_count};
 use super::job::{AwaitedOutcome, Job, To};
 use super::lambda_list::{LambdaList, LambdaListKind};
-use super::scope::{FunctionMeaning, Visible};
+use super::scope::{FunctionMeaning, LocalSignature, Visible};
 use crate::core::{Callee, NodeId, NodeKind, VarId};
 use crate::diagnostic::code;
+use crate::similar::is_like;
 
 /// Arguments that a call passes in registers. Further arguments are passed as a list.
 pub(super) const DIRECT_ARGUMENTS: usize = 60;
@@ -22,7 +24,7 @@ pub(super) const DIRECT_ARGUMENTS: usize = 60;
 /// Function that a call designates.
 enum FunctionDesignator {
     /// A local function, kept in this variable.
-    Local(VarId, Arity),
+    Local(VarId, LocalSignature),
     /// A global function, by name.
     Global(WrittenName),
     /// The function that a symbol names when the call is made, unknown until then.
@@ -40,8 +42,8 @@ impl Expander {
         to: To,
     ) -> Checked {
         match self.scope.function(&form.operator, self.level()) {
-            Visible::Is(FunctionMeaning::Local(variable, arity)) => {
-                self.call(environment, FunctionDesignator::Local(variable, arity), &form.args, &form, to)
+            Visible::Is(FunctionMeaning::Local(variable, signature)) => {
+                self.call(environment, FunctionDesignator::Local(variable, signature), &form.args, &form, to)
             }
             Visible::Is(FunctionMeaning::Macro(Some(function))) => {
                 self.stop_for_form(MacroRef::Local(function), &form, false, to)
@@ -158,11 +160,16 @@ impl Expander {
     ) -> Checked {
         let count = args.len();
         let (callee, mut jobs) = match target {
-            FunctionDesignator::Local(variable, arity) => {
+            FunctionDesignator::Local(variable, LocalSignature { arity, keys }) => {
                 self.note_read(variable, to);
                 if !accepts(arity, u32::try_from(count).unwrap_or(u32::MAX)) {
                     let function = name(&self.core().variables[variable.index()].name);
                     self.report(wrong_count(&function, arity, count as u32, to.span), to.origin);
+                } else if let Some(keys) = keys {
+                    let function = name(&self.core().variables[variable.index()].name);
+                    if let Some(warning) = wrong_key(&function, &keys, args, form) {
+                        self.report(warning, to.origin);
+                    }
                 }
                 (Callee::Local(variable), Vec::new())
             }
@@ -315,8 +322,8 @@ impl Expander {
         let Some(function) = WrittenName::of(named) else { return other() };
         if is_function {
             match self.scope.function(&function.cell, self.level()) {
-                Visible::Is(FunctionMeaning::Local(variable, arity)) => {
-                    return Ok(FunctionDesignator::Local(variable, arity));
+                Visible::Is(FunctionMeaning::Local(variable, signature)) => {
+                    return Ok(FunctionDesignator::Local(variable, signature));
                 }
                 Visible::Is(FunctionMeaning::Macro(_)) => return other(),
                 Visible::OutOfReach => return Err(function.out_of_reach(form)),
@@ -482,4 +489,29 @@ pub(super) fn apply_global(
     expander.fill(to, NodeKind::Apply(callee, nodes));
     expander.schedule(jobs);
     Ok(())
+}
+
+/// The warning about a keyword that a local function does not take: `keys` are the number of arguments before the
+/// keyword arguments, and the keywords.
+fn wrong_key(function: &str, keys: &(usize, Vec<Symbol>), args: &[Datum], form: &Form) -> Option<Diagnostic> {
+    let (positional, keys) = keys;
+    let given = args.get(*positional..)?;
+    let is_known_key =
+        |key: &Datum| key.as_symbol().is_none_or(|key| !key.is_keyword() || keys.contains(key));
+    let names_all = |key: &Datum| key.as_symbol().is_some_and(|key| key.name() == "ALLOW-OTHER-KEYS");
+    if given.iter().step_by(2).any(names_all) {
+        return None;
+    }
+    if !given.len().is_multiple_of(2) {
+        let message = format!("{function} takes keywords and values in pairs, but one of them is alone");
+        return Some(code::WRONG_ARGUMENT_COUNT.at(form.span, message));
+    }
+    let unknown = given.iter().step_by(2).find(|key| !is_known_key(key))?;
+    let symbol = unknown.as_symbol()?;
+    let message = format!("{function} takes no keyword `:{}`", plain(symbol).trim_start_matches(':'));
+    let warning = code::UNKNOWN_KEYWORD.at(form.at(unknown.span()), message);
+    Some(match keys.iter().find(|key| is_like(key.name(), symbol.name())) {
+        Some(key) => warning.help(format!("did you mean `:{}`?", key.name().to_lowercase())),
+        None => warning,
+    })
 }

@@ -12,6 +12,7 @@ use super::job::{Job, LongCond, PARTS_AT_ONCE, To};
 use super::scope::{ScopeEntry, Tag, Visible};
 use crate::core::{BlockId, BoundVariable, NodeId, NodeKind, TagbodyItem};
 use crate::diagnostic::code;
+use crate::similar::is_like;
 
 /// `(quote datum)`
 pub(super) fn quote(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
@@ -301,6 +302,10 @@ fn unknown_block(expander: &Expander, form: &Form, block: &Symbol) -> Box<Diagno
     let message = format!("no block called {} encloses this {}", name(block), name(&form.operator));
     let named = form.args.first().map_or(form.span, Datum::span);
     let diagnostic = code::UNKNOWN_BLOCK.at(form.at(named), message);
+    let like = expander.scope.block_names().filter(|name| is_like(name.name(), block.name()));
+    if let Some(like) = like.min_by_key(|name| name.name()) {
+        return Box::new(diagnostic.help(format!("did you mean `{}`?", plain(like))));
+    }
     let mut around: Vec<String> = expander
         .scope
         .block_names()
@@ -372,7 +377,13 @@ pub(super) fn go(expander: &mut Expander, _: &mut dyn Environment, form: Form, t
         }
         Visible::OutOfReach | Visible::No => {
             let message = format!("no `tagbody` around this `go` has the tag {}", quoted(&form.args[0]));
-            Err(Box::new(code::UNKNOWN_TAG.at(form.at(form.args[0].span()), message)))
+            let diagnostic = code::UNKNOWN_TAG.at(form.at(form.args[0].span()), message);
+            let Tag::Symbol(tag) = tag else { return Err(Box::new(diagnostic)) };
+            let like = expander.scope.tag_names().filter(|name| is_like(name.name(), tag.name()));
+            Err(Box::new(match like.min_by_key(|name| name.name()) {
+                Some(like) => diagnostic.help(format!("did you mean `{}`?", plain(like))),
+                None => diagnostic,
+            }))
         }
     }
 }

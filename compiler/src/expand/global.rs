@@ -4,7 +4,7 @@
 use esl_bytecode::compile::Arity;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
-use esl_bytecode::span::Span;
+use esl_bytecode::span::{SourceId, Span};
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -83,6 +83,8 @@ pub(super) struct GlobalUses {
     pub(super) traps: Vec<GuardianTrap>,
     /// Names that the unit uses as operations.
     pub(super) operations: FxHashSet<Symbol>,
+    /// Causes, goals and the like that top-level forms define, by source, kind and name, and their places.
+    pub(super) definitions: FxHashMap<(SourceId, &'static str, String), Span>,
     /// Functions that the unit defines; `None` if several definitions differ in the number of arguments.
     pub(super) functions: FxHashMap<FunctionName, Option<Box<DefinedFunction>>>,
     /// Macros that the unit defines, and the places of their names.

@@ -1,5 +1,7 @@
 //! Local functions and macros: `flet`, `labels`, `macrolet`.
 
+use std::sync::Arc;
+
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::Datum;
 
@@ -8,7 +10,7 @@ use super::form::{Checked, Form, Make, bound_twice, check_distinct, quoted, span
 use super::function::{Body, FunctionParts, WrittenName};
 use super::job::{Job, LocalFunctions, PARTS_AT_ONCE, To};
 use super::origin::OriginId;
-use super::scope::{FunctionMeaning, ScopeEntry};
+use super::scope::{FunctionMeaning, LocalSignature, ScopeEntry};
 use crate::core::NodeKind;
 use crate::diagnostic::code;
 
@@ -124,7 +126,14 @@ impl Expander {
             };
             let text = self.lambda_text(environment, parts, form, to.origin)?;
             let variable = self.variable(name.name.symbol.clone(), span_of(&name.datum, to.span), to);
-            entries.push(ScopeEntry::Function(name.cell, FunctionMeaning::Local(variable, text.arity())));
+            let list = &text.list;
+            let keys = list.keys.as_ref().filter(|_| !list.allow_other_keys);
+            let keys = keys.map(|keys| {
+                let positional = list.required.len() + list.optional.len();
+                Arc::new((positional, keys.iter().map(|key| key.key.clone()).collect()))
+            });
+            let signature = LocalSignature { arity: text.arity(), keys };
+            entries.push(ScopeEntry::Function(name.cell, FunctionMeaning::Local(variable, signature)));
             let lambda = self.lambda(to);
             functions.push((variable, lambda));
             lambdas.extend([

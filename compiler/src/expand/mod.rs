@@ -70,7 +70,7 @@
 //!
 //! Data and tables come first (`form`, `scope`, `lambda_list`, `function`, `setf`, `origin`, `job`, `chunk`,
 //! `failure`, `trap`, `global`, `argument`, `directive`, `warning`, `unit`), then the [`Expander`], its
-//! findings (`finding`) and its checks of forms as they are written (`check`), then one file for each family
+//! findings (`finding`) and its checks of forms as they are written (`check`, `twice`), then one file for each family
 //! of forms, whose methods are methods of the `Expander`, and last the table of operators. A file uses only
 //! files before it; `tests/layers.rs` holds that.
 
@@ -110,6 +110,7 @@ mod setf;
 mod standard_place;
 mod toplevel;
 mod trap;
+mod twice;
 mod unit;
 mod values;
 mod variable;

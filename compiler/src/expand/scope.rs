@@ -8,6 +8,8 @@
 //! macros around it, but no variables, functions, blocks or tags. Every meaning knows the level of its chunk;
 //! see [`Visible::OutOfReach`].
 
+use std::sync::Arc;
+
 use esl_bytecode::BigInt;
 use esl_bytecode::compile::{Arity, Environment};
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
@@ -29,11 +31,20 @@ pub(super) enum VariableMeaning {
     SymbolMacro(Datum),
 }
 
+/// The arguments that a local function takes.
+#[derive(Clone, Debug)]
+pub(super) struct LocalSignature {
+    /// Their number.
+    pub(super) arity: Arity,
+    /// Number of arguments before the keyword arguments, and the keywords; `None` if it takes any or none.
+    pub(super) keys: Option<Arc<(usize, Vec<Symbol>)>>,
+}
+
 /// Meaning of a name as a function.
 #[derive(Clone, Debug)]
 pub(super) enum FunctionMeaning {
     /// A local function, kept in this variable.
-    Local(VarId, Arity),
+    Local(VarId, LocalSignature),
     /// A local macro; `None` if its definition failed, which has been reported.
     Macro(Option<ObjectId>),
 }
@@ -275,6 +286,14 @@ impl Scope {
     /// Returns the names of the blocks in scope.
     pub(super) fn block_names(&self) -> impl Iterator<Item = &Symbol> {
         self.blocks.keys()
+    }
+
+    /// Returns the symbols that are tags in scope.
+    pub(super) fn tag_names(&self) -> impl Iterator<Item = &Symbol> {
+        self.tags.keys().filter_map(|tag| match tag {
+            Tag::Symbol(symbol) => Some(symbol),
+            Tag::Integer(_) => None,
+        })
     }
 
     /// Returns what macros may ask for.

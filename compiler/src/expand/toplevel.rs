@@ -67,6 +67,9 @@ impl Expander {
             let global = environment.global(&form.operator);
             if global.locked && global.function == GlobalFunction::Macro {
                 self.check_written(environment, &form, top.origin);
+                if top.origin.is_none() && matches!(top.mode, Mode::File { .. }) {
+                    self.check_twice(&form, &datum);
+                }
             }
             let is_macro = self.is_macro(environment, &form.operator);
             if is_macro && !self.globals.is_broken_macro(&form.operator) {

@@ -15,6 +15,7 @@ use super::global::{GlobalUses, NameUsed, PendingCall, accepts, wrong_count};
 use super::warning::AND_HERE;
 use crate::diagnostic::code;
 use crate::habit::word;
+use crate::similar::is_like;
 
 /// Undefined names for which similar ones are suggested; each suggestion looks at all names.
 const COMPARED: usize = 50;
@@ -335,23 +336,6 @@ impl KnownFunction {
             self.explain(warning, &call.function)
         })
     }
-}
-
-/// Whether two names differ in one character, or in two neighbours.
-fn is_like(left: &str, right: &str) -> bool {
-    let (left, right): (Vec<char>, Vec<char>) = (left.chars().collect(), right.chars().collect());
-    let (short, long) = if left.len() <= right.len() { (&left, &right) } else { (&right, &left) };
-    if long.len() - short.len() > 1 || short.len() < 2 {
-        return false;
-    }
-    let same = short.iter().zip(long.iter()).take_while(|(a, b)| a == b).count();
-    let (short, long) = (&short[same..], &long[same..]);
-    let has_same_end = |a: &[char], b: &[char]| a == b;
-    if short.len() < long.len() {
-        return has_same_end(short, &long[1..]);
-    }
-    let is_swapped = short.len() > 1 && short[0] == long[1] && short[1] == long[0];
-    short.is_empty() || has_same_end(&short[1..], &long[1..]) || is_swapped && short[2..] == long[2..]
 }
 
 /// Returns the number of parameters before `&rest` and `&key`.

@@ -122,6 +122,7 @@ fn unknown_exits() {
 (defun first-even (numbers)
   (return-from first-evn numbers))
 (tagbody (go end))
+(tagbody (go edn) start end)
 (block b (macrolet ((m () (return-from b 1))) 2))
 ",
     );
