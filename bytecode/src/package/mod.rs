@@ -159,8 +159,15 @@ impl Packages {
     }
 
     /// Returns all packages, the oldest first.
-    pub fn all(&self) -> impl ExactSizeIterator<Item = PackageId> + use<> {
-        (0..self.table.0.len() as u32).map(PackageId)
+    pub fn all(&self) -> impl Iterator<Item = PackageId> {
+        let all = (0..self.table.0.len() as u32).map(PackageId);
+        all.filter(|&package| self.named(self.name(package)) == Some(package))
+    }
+
+    /// Takes its names from a package, and what it uses. No package is found by them any more.
+    pub fn forget(&mut self, package: PackageId) {
+        self.by_name.retain(|_, known| *known != package);
+        self.table[package].uses.clear();
     }
 
     /// Returns the package of this name or nickname.

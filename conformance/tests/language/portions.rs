@@ -299,3 +299,29 @@ proptest! {
         check(PROGRAMS[program], &Config { seed, slice, budget, ..Config::default() }, &portions);
     }
 }
+
+/// The journal has the calls of the failure of a task that belongs to a form, and the arguments of one that a recovery
+/// procedure applies to at once.
+#[test]
+fn the_journal_has_calls_and_arguments() {
+    use esl::host::SurveyRequest;
+    let text = "(defun inner () (fail :stuck 'drill 5))
+(with-recovery-procedures ((:stuck (abort 'net)))
+  (task-net (one (list (inner))) (two (sleep 9))))
+(with-recovery-procedures ((:lost (place) (abort place)))
+  (fail :lost 'dock))";
+    let program = program::compile(&[Source::new("journal.esl", text)]).program.expect("it compiles");
+    let mut machine =
+        program::machine(Config::default(), Box::new(VirtualHost::new())).expect("there is room");
+    machine.keep_journal();
+    program::begin(&mut machine, &program).expect("it can start");
+    machine.run(u64::MAX);
+    let survey = machine.survey(&SurveyRequest { failures_after: Some(0), ..SurveyRequest::default() });
+    let rows = survey.failures;
+    let stuck = rows.iter().find(|row| row.cause == ":STUCK" && row.report.is_some()).expect("it has ended");
+    let functions: Vec<&str> = stuck.frames.iter().map(|frame| &*frame.function).collect();
+    assert_eq!(functions.first(), Some(&"INNER"), "{rows:?}");
+    assert_eq!(stuck.arguments, "DRILL, 5");
+    let lost = rows.iter().find(|row| row.cause == ":LOST").expect("it is noted");
+    assert_eq!(lost.arguments, "DOCK");
+}

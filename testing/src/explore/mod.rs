@@ -33,7 +33,7 @@ pub use esl_vm::explore::{
 use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Vm};
 pub use forms::SourceForms;
-pub use unseen::{UnseenChange, UnseenKind, unseen_changes};
+pub use unseen::{UnseenChange, UnseenKind, reads_clock, unseen_changes};
 pub use verdict::{ExplorationScope, grains};
 
 /// A run as it is seen from outside.
@@ -92,6 +92,7 @@ pub fn explore_together(
     prepare: Prepare<'_>,
     goes_on: impl FnMut(&SearchProgress) -> bool,
 ) -> Result<Exploration<Behaviour>, Error> {
+    let settings = &Settings { clock: settings.clock || reads_clock(program), ..*settings };
     let begin = || {
         let (machine, main, captured) = begin(program, prepare, settings.snapshots)?;
         Ok((machine, (main, captured)))

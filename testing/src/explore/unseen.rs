@@ -11,7 +11,7 @@
 use std::fmt;
 
 use esl::program::Program;
-use esl_bytecode::builtin::Builtin;
+use esl_bytecode::builtin::{Builtin, Shares};
 use esl_bytecode::module::{Constant, Module, ModuleFunction};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
@@ -76,19 +76,13 @@ impl fmt::Display for UnseenChange {
     }
 }
 
-/// Functions of the library that change an argument, by what they change.
+/// Functions written in ESL that change an argument, by what they change. Of those written in Rust, the table of
+/// builtins says it.
 const CHANGING: &[(UnseenKind, &[&str])] = &[
     (
         UnseenKind::Pair,
         &[
-            "RPLACA",
-            "RPLACD",
-            "%SET-CAR",
-            "%SET-CDR",
             "%SET-NTH",
-            "NBUTLAST",
-            "NCONC",
-            "NRECONC",
             "NUNION",
             "NINTERSECTION",
             "NSET-DIFFERENCE",
@@ -104,7 +98,6 @@ const CHANGING: &[(UnseenKind, &[&str])] = &[
             "NSUBSTITUTE",
             "NSUBSTITUTE-IF",
             "NSUBSTITUTE-IF-NOT",
-            "NREVERSE",
             "SORT",
             "STABLE-SORT",
             "MERGE",
@@ -115,26 +108,12 @@ const CHANGING: &[(UnseenKind, &[&str])] = &[
     (
         UnseenKind::Element,
         &[
-            "%SET-ELT",
-            "%SET-SVREF",
-            "%SET-AREF",
-            "%SET-ROW-MAJOR-AREF",
-            "%SET-CHAR",
-            "%SET-FILL-POINTER",
-            "%FILL",
-            "%REPLACE",
-            "%FILL-MORE",
-            "%NSTRING-UPCASE",
-            "%NSTRING-DOWNCASE",
             "NSTRING-UPCASE",
             "NSTRING-DOWNCASE",
             "NSTRING-CAPITALIZE",
             "FILL",
             "REPLACE",
             "MAP-INTO",
-            "VECTOR-PUSH",
-            "VECTOR-PUSH-EXTEND",
-            "VECTOR-POP",
             "ADJUST-ARRAY",
             "READ-SEQUENCE",
             "BIT-AND",
@@ -146,9 +125,6 @@ const CHANGING: &[(UnseenKind, &[&str])] = &[
     (
         UnseenKind::Slot,
         &[
-            "%SET-SLOT",
-            "%SET-STRUCTURE-REF",
-            "%SET-SLOT-VALUE",
             "%SET-SLOT-VALUE-OF",
             "SLOT-MAKUNBOUND",
             "SHARED-INITIALIZE",
@@ -156,22 +132,12 @@ const CHANGING: &[(UnseenKind, &[&str])] = &[
             "CHANGE-CLASS",
         ],
     ),
-    (
-        UnseenKind::Table,
-        &[
-            "%PUTHASH",
-            "%ADD-TO-VALUE",
-            "REMHASH",
-            "CLRHASH",
-            "%SET-TABLE-VALUE",
-            "%TABLE-ADD",
-            "%TABLE-DELETE",
-        ],
-    ),
-    (UnseenKind::Property, &["%PUT", "%SET-PROPERTY", "REMPROP", "%SET-SYMBOL-PLIST", "%PUTF", "%REMF"]),
-    (UnseenKind::Variable, &["SET", "MAKUNBOUND"]),
+    (UnseenKind::Property, &["%SET-PROPERTY"]),
     (UnseenKind::Code, &["EVAL", "COMPILE", "LOAD"]),
 ];
+
+/// Functions written in ESL that give the time.
+const CLOCKS: &[&str] = &["GET-DECODED-TIME"];
 
 /// Returns the kinds of changes that a program makes and that a grain does not see, each with its first
 /// place.
@@ -232,24 +198,31 @@ fn instructions(function: &ModuleFunction) -> impl Iterator<Item = (usize, Instr
     })
 }
 
-/// Returns the kind of change that an instruction makes, if it makes one.
-fn kind_of(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<UnseenKind> {
+/// Returns whether the program reads the clock, so that the time may decide what it does, or may do so by code
+/// that it makes while it runs.
+pub fn reads_clock(program: &Program) -> bool {
+    let module = program.module();
+    module.functions.iter().any(|function| {
+        instructions(function).any(|(_, instr)| {
+            function_named(module, function, instr).is_some_and(|symbol| {
+                let is_clock = |builtin: Builtin| builtin.info().shares == Shares::Clock;
+                Builtin::named(&symbol).is_some_and(is_clock)
+                    || symbol.is_in(CL_PACKAGE) && CLOCKS.contains(&symbol.name())
+                    || kind_of_function(&symbol) == Some(UnseenKind::Code)
+            })
+        })
+    })
+}
+
+/// Returns the name of the function that an instruction calls or refers to.
+fn function_named(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<Symbol> {
     let constant = |index: usize| match module.constants.get(function.constants.get(index)?.0 as usize)? {
-        Constant::Symbol(symbol) => kind_of_function(symbol),
+        Constant::Symbol(symbol) => Some(symbol.clone()),
         _ => None,
     };
-    let builtin =
-        |number: u32| Builtin::from_number(number).and_then(|builtin| kind_of_function(&builtin.symbol()));
     match instr {
-        Instr::SetSymbolValue { .. } => Some(UnseenKind::Variable),
-        Instr::BoxSet { .. } | Instr::CaptureBoxSet { .. } => Some(UnseenKind::Captured),
-        Instr::SetSlot { .. } => Some(UnseenKind::Slot),
-        Instr::VectorSet { .. } | Instr::VectorSetInt { .. } | Instr::ArraySet { .. } => {
-            Some(UnseenKind::Element)
-        }
-        Instr::SetCar { .. } | Instr::SetCdr { .. } => Some(UnseenKind::Pair),
         Instr::CallBuiltin { builtin: number, .. } | Instr::TailCallBuiltin { builtin: number, .. } => {
-            builtin(number.0)
+            Some(Builtin::from_number(number.0)?.symbol())
         }
         Instr::CallGlobal { symbol, .. } | Instr::TailCallGlobal { symbol, .. } => {
             constant(symbol.0 as usize)
@@ -260,10 +233,35 @@ fn kind_of(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<U
     }
 }
 
+/// Returns the kind of change that an instruction makes, if it makes one.
+fn kind_of(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<UnseenKind> {
+    match instr {
+        Instr::SetSymbolValue { .. } => Some(UnseenKind::Variable),
+        Instr::BoxSet { .. } | Instr::CaptureBoxSet { .. } => Some(UnseenKind::Captured),
+        Instr::SetSlot { .. } => Some(UnseenKind::Slot),
+        Instr::VectorSet { .. } | Instr::VectorSetInt { .. } | Instr::ArraySet { .. } => {
+            Some(UnseenKind::Element)
+        }
+        Instr::SetCar { .. } | Instr::SetCdr { .. } => Some(UnseenKind::Pair),
+        _ => kind_of_function(&function_named(module, function, instr)?),
+    }
+}
+
 /// Returns what the function of this name changes, if the library has one that changes an argument.
 fn kind_of_function(symbol: &Symbol) -> Option<UnseenKind> {
     if !symbol.is_in(CL_PACKAGE) && !symbol.is_in(ESL_PACKAGE) {
         return None;
+    }
+    if let Some(builtin) = Builtin::named(symbol) {
+        return match builtin.info().shares {
+            Shares::Pairs => Some(UnseenKind::Pair),
+            Shares::Elements => Some(UnseenKind::Element),
+            Shares::Slots => Some(UnseenKind::Slot),
+            Shares::Tables => Some(UnseenKind::Table),
+            Shares::Properties => Some(UnseenKind::Property),
+            Shares::Variables => Some(UnseenKind::Variable),
+            Shares::Nothing | Shares::Points | Shares::Clock | Shares::Own => None,
+        };
     }
     let (kind, _) = CHANGING.iter().find(|(_, names)| names.contains(&symbol.name()))?;
     Some(*kind)
@@ -311,6 +309,31 @@ mod tests {
         ];
         for (text, expected) in expected {
             assert_eq!(kinds(text), *expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_lists_of_functions_in_esl_have_no_builtin_and_no_other_name() {
+        let names = CHANGING.iter().flat_map(|(_, names)| *names).chain(CLOCKS);
+        for name in names {
+            let symbols = [Symbol::cl(name), Symbol::esl(name)];
+            assert_eq!(symbols.iter().find(|symbol| Builtin::named(symbol).is_some()), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn programs_that_read_the_clock_are_found() {
+        let reads = |text: &str| {
+            let compiled = compile(&[Source::new("clock.esl", text)]);
+            reads_clock(&compiled.program.unwrap_or_else(|| panic!("{text}: {:?}", compiled.diagnostics)))
+        };
+        for text in
+            ["(print (now))", "(mapcar #'now nil)", "(defun f () (get-universal-time))", "(eval '(now))"]
+        {
+            assert!(reads(text), "{text}");
+        }
+        for text in ["(sleep 3)", "(with-timeout 3 (sleep 1))", "(do-every 1 (print 1) (return))"] {
+            assert!(!reads(text), "{text}");
         }
     }
 

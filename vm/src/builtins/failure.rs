@@ -15,10 +15,10 @@ use crate::task::{EntryKind, TaskEnd, UnwindTarget, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
-use super::expect::exactly;
+use super::expect::{exactly, optional};
 
 pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [height, failure] = exactly(arguments);
+    let [height, failure] = exactly(&arguments[..2]);
     let (is_failure, is_first) = (failure.is_true(), height.is_nil());
     let height = match height.as_index() {
         Some(height) => height,
@@ -26,7 +26,7 @@ pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         None => return vm.exchange.type_error(height, "UNSIGNED-BYTE"),
     };
     if vm.watch.is_watched && is_failure && is_first {
-        report::tell_of_failure(vm, failure, false);
+        report::tell_of_failure(vm, failure, optional(arguments, 2));
     }
     let mut steps = 0;
     let found = vm.scheduler.task().control.find_handlers(height, is_failure, &mut steps);
@@ -74,7 +74,7 @@ pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         state
     };
     if vm.watch.is_watched {
-        report::tell_of_failure(vm, failure, true);
+        report::tell_of_recovery(vm, failure);
     }
     Ok(state)
 }

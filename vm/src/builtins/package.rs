@@ -176,6 +176,12 @@ pub(super) fn make_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.names.package_object(&mut vm.heap, package)?)
 }
 
+pub(super) fn forget_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let package = designated_package(vm, arguments[0])?;
+    vm.names.packages_mut().forget(package);
+    Ok(Value::T)
+}
+
 pub(super) fn use_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.names.check_room(&mut vm.heap)?;
     let uses = designated_packages(vm, arguments[0])?;

@@ -4,7 +4,7 @@
 //! of them), the values, functions and properties of symbols, facts and rules, timers, and all objects that
 //! can be reached from there. Objects have no addresses in it: each is the number of those that were met
 //! before it, in an order that depends on the state alone. Tables are hashed in the order of their entries,
-//! facts in that of their assertion, times relative to now; with points at all ticks, also the time itself.
+//! facts in that of their assertion, times relative to now; also the time itself if the program may know it.
 //!
 //! Which fields of the machine belong to it is said by `state`, and visited in `content`. Not part of a
 //! state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that will not be read
@@ -32,7 +32,6 @@ use crate::heap::{Heap, Kind};
 use crate::interp::frames::Frames;
 use crate::names::load::image_origin;
 use crate::names::{GivenMap, Names};
-use crate::schedule::Grain;
 use crate::shape::{CodeKind, Shape};
 use crate::state::{VisitCourse, VisitVm};
 use crate::table::Table;
@@ -180,9 +179,7 @@ impl Fingerprints {
         let mut met = std::mem::take(&mut self.met);
         met.clear();
         let mut digest = Digest::default();
-        // At a tick a task may hold a time that it has read, such as the deadline of a sleep; relative times
-        // do not tell whether that has passed.
-        if !is_strict && vm.scheduler.points.grain == Some(Grain::Ticks) {
+        if !is_strict && vm.scheduler.points.has_clock {
             digest.add(now);
         }
         let mut walk = Walk { vm, known: self, digest, met, next: 0, now, task: None, is_strict };

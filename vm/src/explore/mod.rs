@@ -126,6 +126,9 @@ pub struct Settings {
     /// Whether states also differ by what was written to standard output. Without this, an ending stands for
     /// all runs that passed through the same states, whatever they had written before.
     pub output: bool,
+    /// Whether states also differ by the time, because the program reads the clock. Without this, times are
+    /// relative to the time of the state. At grain `ticks`, states always differ by it.
+    pub clock: bool,
 }
 
 impl Default for Settings {
@@ -140,6 +143,7 @@ impl Default for Settings {
             switches: None,
             faults: None,
             output: true,
+            clock: false,
         }
     }
 }

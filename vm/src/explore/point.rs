@@ -120,6 +120,9 @@ fn follow(
 /// Makes tasks stop at points from now on.
 pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.scheduler.points.grain = Some(settings.grain);
+    // At a tick a task may hold a time that the library has read, such as the deadline of a sleep; relative
+    // times do not tell whether that has passed.
+    vm.scheduler.points.has_clock = settings.clock || settings.grain == Grain::Ticks;
     vm.config.slice = match settings.grain {
         Grain::Changes | Grain::Reads => settings.turn,
         Grain::Variables | Grain::Ticks => 1,

@@ -230,10 +230,12 @@ pub(crate) fn cause_label(heap: &Heap, condition: Value) -> String {
 }
 
 /// Returns a short text for the arguments of a failure, or for the values of the slots of a condition.
-pub(crate) fn arguments_label(vm: &Vm, condition: Value) -> String {
+pub(crate) fn arguments_label(vm: &Vm, condition: Value, list: Value) -> String {
     let heap = &vm.heap;
-    let Some(class) = heap.structure_class(condition) else { return String::new() };
     let slots = heap.structure_slots(condition).unwrap_or_default();
+    let Some(class) = heap.structure_class(condition) else {
+        return items(vm, list).take(SHOWN).map(|value| describe(heap, value)).collect::<Vec<_>>().join(", ");
+    };
     let arguments: Vec<Value> = if describe(heap, class::name_of(heap, class)) == "FAILURE" {
         items(vm, slots.get(1).copied().unwrap_or(Value::NIL)).take(SHOWN).collect()
     } else {

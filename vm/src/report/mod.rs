@@ -20,7 +20,8 @@ pub(crate) use label::{
     report_in_short, task_label,
 };
 pub(crate) use observe::{
-    note_end_by_failure, show, tell_of_change, tell_of_failure, tell_of_signal, tell_of_waking,
+    note_end_by_failure, show, tell_of_change, tell_of_failure, tell_of_recovery, tell_of_signal,
+    tell_of_waking,
 };
 pub(crate) use tasks::{number_of_owner, operations_left, place_in_program, program_place, tasks_left};
 pub(crate) use trace::{Happening, note, trace_end};

@@ -93,7 +93,7 @@ pub(crate) fn tell_of_signal(vm: &mut Vm, event: Value) {
 }
 
 /// Notes in the journal that the running task fails.
-fn note_failure(vm: &mut Vm, cause: &str, condition: Value) {
+fn note_failure(vm: &mut Vm, cause: &str, condition: Value, arguments: Value) {
     let task = vm.scheduler.task();
     let place = place_in_program(vm, task, vm.frames());
     let row = FailureRow {
@@ -102,7 +102,7 @@ fn note_failure(vm: &mut Vm, cause: &str, condition: Value) {
         task: task.number.0,
         name: label_of(vm, vm.heap.slot_or_nil(task.object, event::NAME), task.number),
         cause: cause.into(),
-        arguments: arguments_label(vm, condition),
+        arguments: arguments_label(vm, condition, arguments),
         place: place.map(|place| format!("{}:{}:{}", place.source, place.line, place.column)),
         report: None,
         frames: Vec::new(),
@@ -115,18 +115,31 @@ pub(crate) fn note_end_by_failure(vm: &mut Vm, condition: Value) {
     let task = vm.scheduler.task();
     let report = task.extra.as_ref().and_then(|extra| extra.report.as_ref());
     let text = report.map_or_else(|| report_in_short(&vm.heap, condition), |report| report.detailed_text());
-    let frames = report.map_or(Vec::new(), |report| report.frames.to_vec());
+    // A task that belongs to a form has no report, but the history that the form is given.
+    let history = task.extra.as_ref().and_then(|extra| extra.values.first().copied());
+    let of_history = || history.map(|history| vm.frames_of_history(history, task.object)).unwrap_or_default();
+    let frames = report.map_or_else(of_history, |report| report.frames.to_vec());
     vm.watch.journal.note_end(task.number.0, text, frames);
 }
 
-/// Tells observers that the running task fails, or recovers.
-pub(crate) fn tell_of_failure(vm: &mut Vm, condition: Value, recovers: bool) {
+/// Tells observers that the running task fails with a condition, or with a cause and a list of arguments.
+pub(crate) fn tell_of_failure(vm: &mut Vm, failure: Value, arguments: Value) {
     let number = vm.scheduler.task().number;
-    let cause = cause_label(&vm.heap, condition);
+    let cause = cause_label(&vm.heap, failure);
     if vm.watch.journal.is_kept {
-        if recovers { vm.watch.journal.recoveries += 1 } else { note_failure(vm, &cause, condition) }
+        note_failure(vm, &cause, failure, arguments);
     }
-    show(vm, number, if recovers { Seen::Recovers(&cause) } else { Seen::Fails(&cause) });
+    show(vm, number, Seen::Fails(&cause));
+}
+
+/// Tells observers that the running task recovers from a failure.
+pub(crate) fn tell_of_recovery(vm: &mut Vm, failure: Value) {
+    let number = vm.scheduler.task().number;
+    let cause = cause_label(&vm.heap, failure);
+    if vm.watch.journal.is_kept {
+        vm.watch.journal.recoveries += 1;
+    }
+    show(vm, number, Seen::Recovers(&cause));
 }
 
 /// Tells observers that the running task has asserted or retracted a fact.

@@ -62,6 +62,8 @@ pub(crate) struct VariableUse {
 pub(crate) struct Points {
     /// Operations before which they stop; `None` unless schedules are explored.
     pub(crate) grain: Option<Grain>,
+    /// Whether states differ by the time.
+    pub(crate) has_clock: bool,
     /// Whether the running task may pass the point at which it stands.
     pub(crate) is_open: bool,
     /// Whether the running task has passed a point, or used a special variable that is not only the task's

@@ -316,6 +316,15 @@ fn a_lost_update_of_an_object_is_found_by_default() {
     folder.file("sleeps.esl", "(let ((cell (list 0))) (sleep 3) (setf (car cell) 1))");
     let (status, output, errors) = run(&folder, &["explore", "sleeps.esl"]);
     assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
+    // A program that reads the clock is elsewhere when time has passed.
+    for (text, wanted) in [
+        ("(loop until (> (now) 3) do (sleep 1))", "complete: no schedule ends badly (grain variables, "),
+        ("(loop (sleep 1) (when (> (now) 100) (fail :late)))", "finding 1: a failure leaves the main task"),
+    ] {
+        folder.file("clock.esl", &format!("(define-cause :late ())\n{text}"));
+        let (_, output, _) = run(&folder, &["explore", "clock.esl"]);
+        assert!(output.starts_with(wanted), "{text}: {output}");
+    }
     // When the finer grain is cut off, the verdict says so, and what the coarser one has shown.
     let (status, output, _) = run(&folder, &["explore", "--states", "50", "tank.esl"]);
     assert_eq!(status, Some(7), "{output}");
