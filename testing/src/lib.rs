@@ -56,6 +56,8 @@ pub struct Setup {
     pub rights: Rights,
     /// Coverage of the program, which was compiled for it, if tests are to add to it.
     pub coverage: Option<Arc<Mutex<Coverage>>>,
+    /// Whether reports of failures show all calls of the library.
+    pub is_full: bool,
 }
 
 impl Setup {
@@ -182,6 +184,9 @@ fn begin(
 ) -> Result<(Vm, TaskId), Error> {
     let mut machine = program::machine(Config { seed, ..setup.config.clone() }, host)?;
     program::set_module_path(&mut machine, &setup.path)?;
+    if setup.is_full {
+        program::set_traces(&mut machine, &["full".into()])?;
+    }
     let name = Datum::string(&test.name, Default::default());
     let main = program::begin_with(&mut machine, program, "%RUN-TEST", &[name])?;
     if setup.coverage.is_some() {

@@ -11,6 +11,7 @@ use esl_host::{Inbox, Incoming, Rights};
 use esl_operate::attach::{self, WireForm};
 
 use super::commands::{LineMeaning, SessionCommand, completions_of, help, meaning_of};
+use super::foreign::foreign;
 use super::lines::{CompletionRequest, Line, WordCompletion};
 use super::refusal::{AttachError, RequestRefusal};
 use super::screen::PromptScreen;
@@ -371,6 +372,12 @@ impl Attached {
     /// session.
     fn evaluate(&mut self, text: &mut String) -> Result<bool, Disconnected> {
         if text.trim().is_empty() {
+            text.clear();
+            return Ok(false);
+        }
+        if let Some(answer) = foreign(text) {
+            self.printer.print(&answer);
+            self.typing.remember(text.trim_end());
             text.clear();
             return Ok(false);
         }

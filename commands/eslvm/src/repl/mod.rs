@@ -21,6 +21,7 @@
 mod attached;
 pub(crate) mod commands;
 pub(crate) mod editor;
+mod foreign;
 pub(crate) mod lines;
 mod refusal;
 pub(crate) mod screen;
@@ -44,6 +45,7 @@ use commands::{LineMeaning, SessionCommand, completions_of, help, meaning_of};
 use esl::module_path::ModulePath;
 use esl::program;
 use esl_command::{NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, complain};
+use foreign::foreign;
 use lines::{CompletionRequest, Line, WordCompletion};
 use screen::PromptScreen;
 use typing::Typing;
@@ -262,6 +264,10 @@ impl Repl {
 
     /// Evaluates the forms of a text and prints their values.
     fn evaluate(&mut self, text: &str) -> Evaluated {
+        if let Some(answer) = foreign(text) {
+            print!("{answer}");
+            return Evaluated::Done;
+        }
         let Some(value) = self.call("%REPL-EVALUATE", text) else { return Evaluated::Done };
         let datum = self.machine.export(value).ok();
         match datum.as_ref().and_then(Datum::as_symbol).map(|symbol| symbol.name()) {

@@ -43,6 +43,8 @@ pub struct Options {
     pub rights: Rights,
     /// Whether a terminal is not to be told how far the tests are.
     pub is_quiet: bool,
+    /// Whether reports of failures show all calls of the library.
+    pub is_full: bool,
 }
 
 /// A file with tests.
@@ -279,7 +281,7 @@ fn suite<'a>(file: &'a Path, library: &[PathBuf], options: &Options) -> Result<S
         }
     };
     let (config, rights) = (options.config.clone(), options.rights.clone());
-    let setup = Setup { config, path, rights, coverage };
+    let setup = Setup { config, path, rights, coverage, is_full: options.is_full };
     Ok(Suite { file, program, setup })
 }
 

@@ -36,6 +36,18 @@ fn test(folder: &Folder, arguments: &[&str]) -> (Option<i32>, String) {
 }
 
 #[test]
+fn calls_of_the_library_are_shown_on_request() {
+    let folder = folder("testing-full");
+    folder.file("sort.esl", "(deftest sorts (is (sort (list 1 'a) (lambda (x y) (< x y)))))");
+    let (status, folded) = test(&folder, &["sort.esl"]);
+    assert_eq!(status, Some(1), "{folded}");
+    assert!(folded.contains("  in SORT, of the library") && !folded.contains("stdlib/"), "{folded}");
+    let (status, full) = test(&folder, &["--full", "sort.esl"]);
+    assert_eq!(status, Some(1), "{full}");
+    assert!(full.contains("  in SORT, stdlib/sort.esl:"), "{full}");
+}
+
+#[test]
 fn failures_are_shown_with_what_repeats_them() {
     let folder = folder("testing-all");
     let (status, output) = test(&folder, &["--jobs", "2", "--budget", "3000000", "tests.esl"]);

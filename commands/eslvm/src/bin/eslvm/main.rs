@@ -108,6 +108,7 @@ fn main() -> ExitCode {
             seed,
             junit,
             coverage,
+            full,
             budget,
             memory,
             compiling,
@@ -131,6 +132,7 @@ fn main() -> ExitCode {
                         config,
                         rights,
                         is_quiet,
+                        is_full: full,
                     },
                 )
             })

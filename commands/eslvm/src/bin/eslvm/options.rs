@@ -137,6 +137,9 @@ pub(crate) enum EslvmAction {
         /// those that were not run
         #[arg(long, value_name = "FILE")]
         coverage: Option<PathBuf>,
+        /// Show all calls of the library in reports of failures, which are folded otherwise
+        #[arg(long)]
+        full: bool,
         /// Most ticks of a run of a test
         #[arg(long, value_name = "TICKS", default_value_t = 1_000_000_000)]
         budget: u64,
