@@ -37,7 +37,7 @@ pub enum Visibility {
 pub enum Shares {
     /// Nothing: it changes no object that was there before the call.
     Nothing,
-    /// What it reads or changes is at a point, before which other tasks may go first.
+    /// Its reads and changes are at a point, before which other tasks may go first.
     Points,
     /// It changes a pair that others may hold.
     Pairs,
