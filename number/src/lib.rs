@@ -1,8 +1,8 @@
 //! The numeric tower: integers of any size, ratios and doubles, with the contagion of Common Lisp. Arithmetic
 //! of complex numbers is in ESL (`stdlib/complex.esl`).
 //!
-//! Functions on values of a heap ([`Numbers`]), for the builtins, and for the interpreter when the operands of
-//! an instruction are neither two fixnums nor two doubles.
+//! Functions on values of a heap ([`Numbers`]), for the builtins, and for the interpreter when the operands
+//! of an instruction are neither two fixnums nor two doubles.
 //!
 //! Guarantees: results are normalized, so that a number has one representation (a bignum never fits a fixnum;
 //! a ratio is in lowest terms with a denominator above one) and `eql` compares representations. A float and a
