@@ -1,7 +1,8 @@
 //! Compiles and runs mutated conformance programs: texts with mixed-up tokens, and bytecode with changed
 //! instructions. None may panic or hang, and none may pass the verifier and do harm.
 //!
-//! `PROPTEST_CASES=10000 cargo test -p esl-conformance --test language --features paranoid -- anything`
+//! `PROPTEST_CASES=10000 cargo test -p esl-conformance --test language --features thorough,paranoid --
+//! anything`
 //! searches longer.
 
 use std::sync::LazyLock;

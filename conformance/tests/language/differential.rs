@@ -129,12 +129,12 @@ fn generated_programs_answer_as_under_sbcl() {
     }
     assert!(
         programs == read("generated.lisp"),
-        "the grammar has changed: run `ESL_BLESS=1 cargo test -p esl-conformance --test language -- differential`"
+        "the grammar has changed: run `ESL_BLESS=1 cargo test -p esl-conformance --test language --features thorough -- differential`"
     );
     compare(&programs, &read("generated.answers"));
 }
 
-/// Needs SBCL: `ESL_SEEDS=1-12 cargo test -p esl-conformance --test language -- differential --ignored`.
+/// Needs SBCL: `ESL_SEEDS=1-12 cargo test -p esl-conformance --test language --features thorough -- differential --ignored`.
 #[test]
 #[ignore = "searches for new differences; needs SBCL"]
 fn programs_of_other_seeds_answer_as_under_sbcl() {

@@ -308,7 +308,7 @@ fn the_journal_has_calls_and_arguments() {
     let text = "(defun inner () (fail :stuck 'drill 5))
 (with-recovery-procedures ((:stuck (abort 'net)))
   (task-net (one (list (inner))) (two (sleep 9))))
-(with-recovery-procedures ((:lost (place) (abort place)))
+(with-recovery-procedures (((:lost place) (abort place)))
   (fail :lost 'dock))";
     let program = program::compile(&[Source::new("journal.esl", text)]).program.expect("it compiles");
     let mut machine =

@@ -5,8 +5,8 @@
 //! reproduces the run. To reproduce it by hand, the command
 //!
 //! ```text
-//! ESL_SCHEDULE="NAME.esl 7 0,1,1,0" cargo test -p esl-conformance --test language schedules::a_given --
-//! --nocapture
+//! ESL_SCHEDULE="NAME.esl 7 0,1,1,0" cargo test -p esl-conformance --features thorough --test language \
+//!     schedules::a_given -- --nocapture
 //! ```
 //!
 //! runs a program of `programs/tasks` with slices of at most seven ticks and these choices, and prints the

@@ -59,6 +59,7 @@ define_known! {
     lambda = cl "LAMBDA";
     structure_object = cl "STRUCTURE-OBJECT";
     raise = esl "%RAISE";
+    failure = esl "FAILURE";
     reserve = esl "%RESERVE";
     expander_text = esl "%EXPANDER-TEXT";
     macro_usage = esl "%MACRO-USAGE";

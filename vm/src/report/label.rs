@@ -258,5 +258,5 @@ pub(crate) fn failure_arguments(vm: &Vm, condition: Value) -> Vec<Datum> {
 
 /// Returns the report of a failure that has ended a task when there was no room for more.
 pub(crate) fn report_in_short(heap: &Heap, condition: Value) -> String {
-    format!("Failure {}, no recovery available.\nAborted\n", describe(heap, condition))
+    format!("Failure {}, no recovery available.\nAborted\n", cause_label(heap, condition))
 }

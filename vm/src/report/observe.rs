@@ -111,12 +111,11 @@ fn note_failure(vm: &mut Vm, cause: &str, condition: Value, arguments: Value) {
 }
 
 /// Notes in the journal that a failure has ended the running task, with its report.
-pub(crate) fn note_end_by_failure(vm: &mut Vm, condition: Value) {
+pub(crate) fn note_end_by_failure(vm: &mut Vm, condition: Value, history: Option<Value>) {
     let task = vm.scheduler.task();
     let report = task.extra.as_ref().and_then(|extra| extra.report.as_ref());
     let text = report.map_or_else(|| report_in_short(&vm.heap, condition), |report| report.detailed_text());
     // A task that belongs to a form has no report, but the history that the form is given.
-    let history = task.extra.as_ref().and_then(|extra| extra.values.first().copied());
     let of_history = || history.map(|history| vm.frames_of_history(history, task.object)).unwrap_or_default();
     let frames = report.map_or_else(of_history, |report| report.frames.to_vec());
     vm.watch.journal.note_end(task.number.0, text, frames);

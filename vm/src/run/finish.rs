@@ -53,7 +53,9 @@ pub(super) fn finish_task(vm: &mut Vm) {
     }
     vm.scheduler.accounts.leave(account);
     report::trace_end(vm, vm.heap.slot_or_nil(object, event::NAME), status);
-    report_end(vm, end, is_awaited || notify.is_true());
+    // See `with_history`.
+    let history = vm.heap.as_cons(result).filter(|_| matches!(end, TaskEnd::Failed(_))).map(|pair| pair.cdr);
+    report_end(vm, end, history, is_awaited || notify.is_true());
     let task = vm.scheduler.task_mut();
     task.state = TaskState::Ended;
     if task.flags.kept() {
@@ -114,11 +116,12 @@ pub(super) fn allocate_without_retry(
 }
 
 /// Reports the failure that has ended the running task, unless a task waits for it or the embedder wants to.
-fn report_end(vm: &mut Vm, end: TaskEnd, is_awaited: bool) {
+/// `history` is that of a failure that a form is told of.
+fn report_end(vm: &mut Vm, end: TaskEnd, history: Option<Value>, is_awaited: bool) {
     if vm.watch.journal.is_kept
         && let TaskEnd::Failed(condition) = end
     {
-        report::note_end_by_failure(vm, condition);
+        report::note_end_by_failure(vm, condition, history);
     }
     let task = vm.scheduler.task_mut();
     if task.flags.kept() || is_awaited {

@@ -14,6 +14,7 @@ use crate::observe::Seen;
 use crate::report::{self, Happening};
 use crate::schedule::{Due, Measure, OpenSlice, OpenTurn, Parking, TurnEnd};
 use crate::task::{AccountId, Task, TaskIndex, TaskNumber, TaskState};
+use crate::value::Value;
 use crate::vm::Vm;
 
 /// Gives a runnable task its turn: one slice, or its parts where it is cut, and as many more as it takes to
@@ -248,8 +249,9 @@ fn begin_running(vm: &mut Vm, has_pending: bool) -> Result<(), Leave> {
     let task = vm.scheduler.task();
     if task.critical > 0 && vm.scheduler.turn.critical_left <= 0 && !task.control.is_unwinding() {
         vm.scheduler.task_mut().critical = 0;
-        let (function, cause) = (vm.names.known.raise, vm.names.known.budget_exhausted);
-        interp::interrupt(vm, function, &[cause], None)?;
+        let known = &vm.names.known;
+        let (function, class, cause) = (known.raise, known.failure, known.budget_exhausted);
+        interp::interrupt(vm, function, &[class, cause, Value::NIL], None)?;
     }
     Ok(())
 }
