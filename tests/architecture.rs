@@ -286,6 +286,7 @@ const LONG_FILES: &[(&str, &str)] = &[
     ("bytecode/src/builtin.rs", "a table: a row for each builtin"),
     ("bytecode/src/opcode.rs", "a table: a row for each opcode, and what is derived of the columns"),
     ("bytecode/tests/soundness.rs", "a model of the machine: an arm for each opcode, over one state"),
+    ("compiler/src/diagnostic/code.rs", "a table: a row for each diagnostic"),
     ("compiler/src/lower/tests/model.rs", "a model of the core language: an arm for each kind of node"),
     ("compiler/src/lower/tests/notation.rs", "a reader of the core language: an arm for each kind of node"),
     ("vm/src/explore/fingerprint.rs", "one walk over all objects, a part for each kind"),

@@ -1,8 +1,8 @@
 //! The work of a query, as it is charged.
 //!
-//! Guarantees: work that grows with its input takes from the effort in proportion, whatever the input is: rows,
-//! answers, arguments, parts of terms. Where an amount is known only when it has been done, the effort may go
-//! below zero; the excess is charged all the same.
+//! Guarantees: work that grows with its input takes from the effort in proportion, whatever the input is:
+//! rows, answers, arguments, parts of terms. Where an amount is known only when it has been done, the
+//! effort may go below zero; the excess is charged all the same.
 
 /// Units for a goal, a row or an answer. The machine charges 64 units as a tick.
 pub(super) const ITEM: usize = 8;

@@ -48,7 +48,8 @@ pub(super) struct Pattern {
     pub(super) arguments: SmallVec<[Term; 6]>,
     /// Pattern for the list of all further arguments; `NIL` for none.
     pub(super) tail: Term,
-    /// Position of the first argument that is a variable and stands before, too; else the number of arguments.
+    /// Position of the first argument that is a variable and stands before, too; else the number of
+    /// arguments.
     pub(super) first_repeated: usize,
 }
 

@@ -162,7 +162,8 @@ impl Relation {
         if (2..=INDEXED_POSITIONS).contains(&width) { (1 << (width - 1)) - 1 } else { 0 }
     }
 
-    /// Returns the row that a new fact replaces, as the value of a property. Adds the rows looked at to `work`.
+    /// Returns the row that a new fact replaces, as the value of a property. Adds the rows looked at to
+    /// `work`.
     pub(super) fn replaced(&self, cells: &[Term], work: &mut usize) -> Option<u32> {
         if !self.is_property {
             return None;

@@ -1,8 +1,8 @@
 //! Rules, which derive facts from others, and their stratification.
 //!
 //! A rule's head is in a stratum above the predicates that the rule negates. Where no such order exists,
-//! because a predicate depends on its own negation, the predicate has no stratum, and queries for it fail. Strata
-//! are found by the first query after a change of the rules.
+//! because a predicate depends on its own negation, the predicate has no stratum, and queries for it fail.
+//! Strata are found by the first query after a change of the rules.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

@@ -7,6 +7,7 @@ use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::symbol::Symbol;
 
 use super::argument::{refused, usage};
+use super::check::wrong_key;
 use super::expander::Expander;
 use super::form::{Checked, Form, Make, arguments, constant_value, infix, is_cl_form, is_known, name, plain};
 use super::function::{FunctionName, WrittenName};
@@ -16,7 +17,6 @@ use super::lambda_list::{LambdaList, LambdaListKind};
 use super::scope::{FunctionMeaning, LocalSignature, Visible};
 use crate::core::{Callee, NodeId, NodeKind, VarId};
 use crate::diagnostic::code;
-use crate::similar::is_like;
 
 /// Arguments that a call passes in registers. Further arguments are passed as a list.
 pub(super) const DIRECT_ARGUMENTS: usize = 60;
@@ -489,29 +489,4 @@ pub(super) fn apply_global(
     expander.fill(to, NodeKind::Apply(callee, nodes));
     expander.schedule(jobs);
     Ok(())
-}
-
-/// The warning about a keyword that a local function does not take: `keys` are the number of arguments before the
-/// keyword arguments, and the keywords.
-fn wrong_key(function: &str, keys: &(usize, Vec<Symbol>), args: &[Datum], form: &Form) -> Option<Diagnostic> {
-    let (positional, keys) = keys;
-    let given = args.get(*positional..)?;
-    let is_known_key =
-        |key: &Datum| key.as_symbol().is_none_or(|key| !key.is_keyword() || keys.contains(key));
-    let names_all = |key: &Datum| key.as_symbol().is_some_and(|key| key.name() == "ALLOW-OTHER-KEYS");
-    if given.iter().step_by(2).any(names_all) {
-        return None;
-    }
-    if !given.len().is_multiple_of(2) {
-        let message = format!("{function} takes keywords and values in pairs, but one of them is alone");
-        return Some(code::WRONG_ARGUMENT_COUNT.at(form.span, message));
-    }
-    let unknown = given.iter().step_by(2).find(|key| !is_known_key(key))?;
-    let symbol = unknown.as_symbol()?;
-    let message = format!("{function} takes no keyword `:{}`", plain(symbol).trim_start_matches(':'));
-    let warning = code::UNKNOWN_KEYWORD.at(form.at(unknown.span()), message);
-    Some(match keys.iter().find(|key| is_like(key.name(), symbol.name())) {
-        Some(key) => warning.help(format!("did you mean `:{}`?", key.name().to_lowercase())),
-        None => warning,
-    })
 }

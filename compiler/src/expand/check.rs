@@ -1,6 +1,6 @@
 //! Checks of forms as they are written, before macros of the library take them apart: format directives
 //! against arguments, forms without a body, tests given to `assert`, and the arguments of failures and of
-//! their procedures.
+//! their procedures; and keywords of local functions.
 //!
 //! Only names of the language are checked, so what they mean is known. A form that a macro of the library
 //! makes is not checked.
@@ -9,6 +9,7 @@ use std::sync::LazyLock;
 
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{CL_PACKAGE, Symbol};
 use rustc_hash::FxHashMap;
@@ -16,11 +17,12 @@ use rustc_hash::FxHashMap;
 use super::argument::usage;
 use super::directive::arguments_of;
 use super::expander::Expander;
-use super::form::{Form, is_known, name, on_one_line, operator};
+use super::form::{Form, is_known, name, on_one_line, operator, plain};
 use super::global::CauseArguments;
 use super::origin::OriginId;
 use super::trap::traps;
 use crate::diagnostic::code;
+use crate::similar::is_like;
 
 /// A check of a form.
 type FormCheck = fn(&mut Expander, &dyn Environment, &Form, Option<OriginId>);
@@ -222,4 +224,34 @@ fn operation(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Optio
 /// A form that handles failures.
 fn guard(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
     expander.guards.push(form.span);
+}
+
+/// The warning about a keyword that a local function does not take: `keys` are the number of arguments
+/// before the keyword arguments, and the keywords.
+pub(super) fn wrong_key(
+    function: &str,
+    keys: &(usize, Vec<Symbol>),
+    args: &[Datum],
+    form: &Form,
+) -> Option<Diagnostic> {
+    let (positional, keys) = keys;
+    let given = args.get(*positional..)?;
+    let is_known_key =
+        |key: &Datum| key.as_symbol().is_none_or(|key| !key.is_keyword() || keys.contains(key));
+    let names_all = |key: &Datum| key.as_symbol().is_some_and(|key| key.name() == "ALLOW-OTHER-KEYS");
+    if given.iter().step_by(2).any(names_all) {
+        return None;
+    }
+    if !given.len().is_multiple_of(2) {
+        let message = format!("{function} takes keywords and values in pairs, but one of them is alone");
+        return Some(code::WRONG_ARGUMENT_COUNT.at(form.span, message));
+    }
+    let unknown = given.iter().step_by(2).find(|key| !is_known_key(key))?;
+    let symbol = unknown.as_symbol()?;
+    let message = format!("{function} takes no keyword `:{}`", plain(symbol).trim_start_matches(':'));
+    let warning = code::UNKNOWN_KEYWORD.at(form.at(unknown.span()), message);
+    Some(match keys.iter().find(|key| is_like(key.name(), symbol.name())) {
+        Some(key) => warning.help(format!("did you mean `:{}`?", key.name().to_lowercase())),
+        None => warning,
+    })
 }

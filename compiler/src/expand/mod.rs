@@ -70,9 +70,9 @@
 //!
 //! Data and tables come first (`form`, `scope`, `lambda_list`, `function`, `setf`, `origin`, `job`, `chunk`,
 //! `failure`, `trap`, `global`, `argument`, `directive`, `warning`, `unit`), then the [`Expander`], its
-//! findings (`finding`) and its checks of forms as they are written (`check`, `twice`), then one file for each family
-//! of forms, whose methods are methods of the `Expander`, and last the table of operators. A file uses only
-//! files before it; `tests/layers.rs` holds that.
+//! findings (`finding`) and its checks of forms as they are written (`check`, `twice`), then one file for
+//! each family of forms, whose methods are methods of the `Expander`, and last the table of operators. A
+//! file uses only files before it; `tests/layers.rs` holds that.
 
 mod allowed;
 mod argument;

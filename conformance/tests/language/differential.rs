@@ -134,7 +134,8 @@ fn generated_programs_answer_as_under_sbcl() {
     compare(&programs, &read("generated.answers"));
 }
 
-/// Needs SBCL: `ESL_SEEDS=1-12 cargo test -p esl-conformance --test language --features thorough -- differential --ignored`.
+/// Needs SBCL: `ESL_SEEDS=1-12 cargo test -p esl-conformance --test language --features thorough --
+/// differential --ignored`.
 #[test]
 #[ignore = "searches for new differences; needs SBCL"]
 fn programs_of_other_seeds_answer_as_under_sbcl() {

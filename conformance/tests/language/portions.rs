@@ -300,8 +300,8 @@ proptest! {
     }
 }
 
-/// The journal has the calls of the failure of a task that belongs to a form, and the arguments of one that a recovery
-/// procedure applies to at once.
+/// The journal has the calls of the failure of a task that belongs to a form, and the arguments of one that
+/// a recovery procedure applies to at once.
 #[test]
 fn the_journal_has_calls_and_arguments() {
     use esl::host::SurveyRequest;

@@ -166,7 +166,8 @@ impl Terms {
         Term(Value::term(index))
     }
 
-    /// Returns the work done for the contents of terms, such as the characters of strings, since the last call.
+    /// Returns the work done for the contents of terms, such as the characters of strings, since the last
+    /// call.
     pub(super) fn take_work(&mut self) -> usize {
         std::mem::take(&mut self.work)
     }

@@ -76,8 +76,8 @@ impl fmt::Display for UnseenChange {
     }
 }
 
-/// Functions written in ESL that change an argument, by what they change. Of those written in Rust, the table of
-/// builtins says it.
+/// Functions written in ESL that change an argument, by what they change. Of those written in Rust, the
+/// table of builtins says it.
 const CHANGING: &[(UnseenKind, &[&str])] = &[
     (
         UnseenKind::Pair,
@@ -198,8 +198,8 @@ fn instructions(function: &ModuleFunction) -> impl Iterator<Item = (usize, Instr
     })
 }
 
-/// Returns whether the program reads the clock, so that the time may decide what it does, or may do so by code
-/// that it makes while it runs.
+/// Returns whether the program reads the clock, so that the time may decide what it does, or may do so by
+/// code that it makes while it runs.
 pub fn reads_clock(program: &Program) -> bool {
     let module = program.module();
     module.functions.iter().any(|function| {

@@ -1,6 +1,6 @@
 //! The REPL of a run that is under way elsewhere: lines are typed here, and evaluated there.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,7 +14,7 @@ use super::commands::{LineMeaning, SessionCommand, completions_of, help, meaning
 use super::foreign::foreign;
 use super::lines::{CompletionRequest, Line, WordCompletion};
 use super::refusal::{AttachError, RequestRefusal};
-use super::screen::PromptScreen;
+use super::screen::{PromptScreen, SessionPrinter};
 use super::typing::Typing;
 use super::wire::{AttachSecurity, Wire};
 use super::{CONTINUATION, PROMPT, in_short};
@@ -54,25 +54,6 @@ const fn row(names: &'static [&'static str], arguments: &'static str, does: &'st
 
 /// The outcome of a request.
 type RunAnswer = Result<WireForm, RequestRefusal>;
-
-/// Where what the run says is printed.
-#[derive(Clone)]
-struct SessionPrinter {
-    screen: PromptScreen,
-    is_interactive: bool,
-}
-
-impl SessionPrinter {
-    fn print(&self, text: &str) {
-        // A closed output is ignored.
-        _ = if self.is_interactive {
-            self.screen.print(text.as_bytes())
-        } else {
-            let mut out = std::io::stdout().lock();
-            out.write_all(text.as_bytes()).and_then(|()| out.flush())
-        };
-    }
-}
 
 /// Reads the secret: that of the file, or of the environment.
 fn secret(file: Option<&Path>) -> Result<String, AttachError> {

@@ -2,8 +2,8 @@
 
 use esl_compiler::habit::statement::statement;
 
-/// Returns the answer to a text that begins with a statement of another language: what it is, and what to write
-/// instead.
+/// Returns the answer to a text that begins with a statement of another language: what it is, and what to
+/// write instead.
 pub(super) fn foreign(text: &str) -> Option<String> {
     let at = text.len() - text.trim_start().len();
     if at == text.len() {

@@ -1,6 +1,6 @@
 //! Printing while a line is being edited.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rustyline::ExternalPrinter;
@@ -35,5 +35,24 @@ impl PromptScreen {
         }
         let mut out = std::io::stdout().lock();
         out.write_all(bytes).and_then(|()| out.flush())
+    }
+}
+
+/// Prints the output of a run elsewhere.
+#[derive(Clone)]
+pub(super) struct SessionPrinter {
+    pub(super) screen: PromptScreen,
+    pub(super) is_interactive: bool,
+}
+
+impl SessionPrinter {
+    pub(super) fn print(&self, text: &str) {
+        // A closed output is ignored.
+        _ = if self.is_interactive {
+            self.screen.print(text.as_bytes())
+        } else {
+            let mut out = io::stdout().lock();
+            out.write_all(text.as_bytes()).and_then(|()| out.flush())
+        };
     }
 }
