@@ -54,6 +54,11 @@ pub(super) struct Pattern {
 }
 
 impl Pattern {
+    /// Returns the bytes that the pattern takes outside of itself.
+    pub(super) fn bytes_beside(&self) -> usize {
+        if self.arguments.spilled() { self.arguments.capacity() * size_of::<Term>() } else { 0 }
+    }
+
     pub(super) fn new(rank: usize, functor: Term, arguments: SmallVec<[Term; 6]>, tail: Term) -> Pattern {
         let mut seen = BTreeSet::new();
         let is_repeated = |argument: &Term| argument.as_variable().is_some_and(|one| !seen.insert(one));
@@ -79,6 +84,19 @@ pub(super) enum Formula {
     Or(Vec<Formula>, usize, usize),
     Not(Box<Formula>),
     Test(TestForm),
+}
+
+impl Formula {
+    /// Returns the bytes that the formula takes outside of itself, approximately.
+    pub(super) fn bytes_beside(&self) -> usize {
+        let inside = |formula: &Formula| size_of::<Formula>() + formula.bytes_beside();
+        match self {
+            Formula::Pattern(pattern) => pattern.bytes_beside(),
+            Formula::And(parts) | Formula::Or(parts, ..) => parts.iter().map(inside).sum(),
+            Formula::Not(part) => inside(part),
+            Formula::Test(_) => 0,
+        }
+    }
 }
 
 /// Returns `None` unless `v` is a logical variable, else whether it has no name.

@@ -169,6 +169,7 @@ impl Database {
         work: &mut usize,
     ) -> Result<(), FormulaError> {
         self.tidy(heap);
+        self.check_room(heap)?;
         let mut parser = FormulaParser::new(&mut self.terms, heap, head_text);
         let parsed = parser
             .pattern(head_text)
@@ -190,7 +191,9 @@ impl Database {
         }
         let rule = Rule { head, body, names, source, held };
         *work += self.rules_to_copy();
+        self.bytes += rule.bytes();
         if let Some(replaced) = Arc::make_mut(&mut self.rules).add(rule, work) {
+            self.bytes -= replaced.bytes();
             self.retired.push_back((self.serial, replaced.held.clone()));
         }
         Ok(())
@@ -217,6 +220,7 @@ impl Database {
         let removed = text.as_ref().ok().and_then(|&source| rules.remove(source, work));
         held.into_iter().for_each(|term| self.terms.release(term));
         if let Some(rule) = &removed {
+            self.bytes -= rule.bytes();
             self.retired.push_back((self.serial, rule.held.clone()));
         }
         text.map(|_| removed.is_some())

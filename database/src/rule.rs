@@ -26,6 +26,17 @@ pub(super) struct Rule {
     pub(super) held: Vec<Term>,
 }
 
+/// Bytes of a rule outside of itself: its place among the rules, and in the maps of its predicate if it is the first.
+const BYTES_BESIDE: usize = size_of::<Arc<Rule>>() + 2 * size_of::<usize>() + size_of::<Predicate>() + 64;
+
+impl Rule {
+    /// Returns the bytes that the rule takes, approximately.
+    pub(super) fn bytes(&self) -> usize {
+        let terms = (self.names.capacity() + self.held.capacity()) * size_of::<Term>();
+        size_of::<Rule>() + BYTES_BESIDE + terms + self.head.bytes_beside() + self.body.bytes_beside()
+    }
+}
+
 /// A functor and a number of arguments for which there are rules.
 #[derive(Clone, Debug)]
 pub(super) struct Predicate {

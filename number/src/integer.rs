@@ -108,6 +108,7 @@ impl Int {
     }
 
     /// Returns the length of the magnitude in limbs of 64 bits, at least 1: the unit of work.
+    #[allow(clippy::len_without_is_empty, reason = "a number has at least one limb")]
     pub fn len(&self) -> usize {
         (self.bits() as usize).div_ceil(64).max(1)
     }

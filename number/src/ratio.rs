@@ -80,6 +80,7 @@ impl Ratio {
     }
 
     /// Returns the length of the longer part in limbs: the unit of work.
+    #[allow(clippy::len_without_is_empty, reason = "a number has at least one limb")]
     pub fn len(&self) -> usize {
         self.numerator.len().max(self.denominator.len())
     }

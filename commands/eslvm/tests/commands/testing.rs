@@ -41,10 +41,10 @@ fn calls_of_the_library_are_shown_on_request() {
     folder.file("sort.esl", "(deftest sorts (is (sort (list 1 'a) (lambda (x y) (< x y)))))");
     let (status, folded) = test(&folder, &["sort.esl"]);
     assert_eq!(status, Some(1), "{folded}");
-    assert!(folded.contains("  in SORT, of the library") && !folded.contains("stdlib/"), "{folded}");
+    assert!(folded.contains("  in STABLE-SORT, of the library") && !folded.contains("stdlib/"), "{folded}");
     let (status, full) = test(&folder, &["--full", "sort.esl"]);
     assert_eq!(status, Some(1), "{full}");
-    assert!(full.contains("  in SORT, stdlib/sort.esl:"), "{full}");
+    assert!(full.contains("  in STABLE-SORT, stdlib/sort.esl:"), "{full}");
 }
 
 #[test]
