@@ -3,13 +3,12 @@
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{Environment, Global, GlobalFunction, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::symbol::Symbol;
 
 use super::argument::{refused, usage};
 use super::check::wrong_key;
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, arguments, constant_value, infix, is_cl_form, is_known, name, plain};
+use super::form::{Checked, Form, Make, arguments, constant_value, infix, is_cl_form, is_known, name};
 use super::function::{FunctionName, WrittenName};
 use super::global::{PendingCall, accepts, is_checked_constant, wrong_count};
 use super::job::{AwaitedOutcome, Job, To};
