@@ -26,7 +26,8 @@ pub(super) struct Rule {
     pub(super) held: Vec<Term>,
 }
 
-/// Bytes of a rule outside of itself: its place among the rules, and that of its predicate if it is the first.
+/// Bytes of a rule outside of itself: its place among the rules, and that of its predicate if it is the
+/// first.
 const BYTES_BESIDE: usize = size_of::<Arc<Rule>>() + 2 * size_of::<usize>() + size_of::<Predicate>() + 64;
 
 impl Rule {
