@@ -35,7 +35,7 @@ macro_rules! packed_as {
         impl Packed for $type {
             fn write(&self, $out: &mut ByteWriter) {
                 let $value = self;
-                $write;
+                let () = $write;
             }
 
             fn read($from: &mut ByteReader<'_>) -> Option<Self> {

@@ -321,7 +321,7 @@ fn a_lost_update_of_an_object_is_found_by_default() {
         ("(loop until (> (now) 3) do (sleep 1))", "complete: no schedule ends badly (grain variables, "),
         ("(loop (sleep 1) (when (> (now) 100) (fail :late)))", "finding 1: a failure leaves the main task"),
     ] {
-        folder.file("clock.esl", &format!("(define-cause :late ())\n{text}"));
+        folder.file("clock.esl", format!("(define-cause :late ())\n{text}"));
         let (_, output, _) = run(&folder, &["explore", "clock.esl"]);
         assert!(output.starts_with(wanted), "{text}: {output}");
     }
