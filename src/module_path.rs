@@ -15,6 +15,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+#[cfg(feature = "world")]
 use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::compile::Required;
 use esl_bytecode::diagnostic::Diagnostic;
@@ -23,7 +24,6 @@ use esl_bytecode::span::SourceId;
 use esl_bytecode::verify::verify;
 use esl_compiler::reader::decode;
 use esl_compiler::similar::is_like;
-#[cfg(feature = "world")]
 use esl_host::Rights;
 use esl_vm::load::LoadError;
 

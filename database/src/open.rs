@@ -7,7 +7,7 @@ use super::query::QueryRoom;
 use super::{Database, Effort, FormulaError, Progress, Query, QueryError};
 
 impl Database {
-    /// Begins a query (see [`Query::begin`]) and returns its number.
+    /// Begins a query (see `Query::begin`) and returns its number.
     ///
     /// # Errors
     /// [`FormulaError`] unless it is a query and there is room.

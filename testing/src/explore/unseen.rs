@@ -12,6 +12,7 @@ use std::fmt;
 
 use esl::program::Program;
 use esl_bytecode::builtin::{Builtin, Shares};
+use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::module::{Constant, Module, ModuleFunction};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
@@ -26,6 +27,8 @@ pub enum UnseenKind {
     Read,
     /// A change of a special variable, which grains below `variables` do not see.
     Variable,
+    /// Of a variable of the library, which only grain `ticks` sees.
+    LibraryVariable,
     /// Of a variable that a closure shares with its surroundings.
     Captured,
     /// Of a slot of a structure or an instance.
@@ -40,6 +43,9 @@ pub enum UnseenKind {
     Property,
     /// Of whatever code changes that is made while the program runs.
     Code,
+    /// Of functions, classes and packages by functions of the program, which no grain sees: states leave them
+    /// out.
+    Definition,
 }
 
 impl fmt::Display for UnseenKind {
@@ -47,6 +53,7 @@ impl fmt::Display for UnseenKind {
         f.write_str(match self {
             UnseenKind::Read => "data that tasks read",
             UnseenKind::Variable => "changes of special variables",
+            UnseenKind::LibraryVariable => "changes of variables of the library",
             UnseenKind::Captured => "changes of variables of closures",
             UnseenKind::Slot => "changes of slots",
             UnseenKind::Element => "changes of elements of arrays",
@@ -54,6 +61,7 @@ impl fmt::Display for UnseenKind {
             UnseenKind::Table => "changes of hash tables",
             UnseenKind::Property => "changes of properties of symbols",
             UnseenKind::Code => "what code does that is made at run time",
+            UnseenKind::Definition => "changes of functions, classes and packages",
         })
     }
 }
@@ -124,16 +132,46 @@ const CHANGING: &[(UnseenKind, &[&str])] = &[
     ),
     (
         UnseenKind::Slot,
-        &[
-            "%SET-SLOT-VALUE-OF",
-            "SLOT-MAKUNBOUND",
-            "SHARED-INITIALIZE",
-            "REINITIALIZE-INSTANCE",
-            "CHANGE-CLASS",
-        ],
+        &["%SET-SLOT-VALUE-OF", "SLOT-MAKUNBOUND", "SHARED-INITIALIZE", "REINITIALIZE-INSTANCE"],
     ),
     (UnseenKind::Property, &["%SET-PROPERTY"]),
     (UnseenKind::Code, &["EVAL", "COMPILE", "LOAD"]),
+    (
+        UnseenKind::Definition,
+        &[
+            "%SET-FUNCTION-NAMED",
+            "%SET-FOUND-CLASS",
+            "%ENSURE-GENERIC",
+            "%ADD-METHOD",
+            "CHANGE-CLASS",
+            "REMOVE-METHOD",
+            "MAKE-PACKAGE",
+            "RENAME-PACKAGE",
+            "DELETE-PACKAGE",
+            "UNUSE-PACKAGE",
+            "UNEXPORT",
+            "SHADOWING-IMPORT",
+            "GENTEMP",
+        ],
+    ),
+];
+
+/// Builtins that change functions, classes and packages.
+const DEFINING: &[&str] = &[
+    "%SET-FUNCTION",
+    "%SET-MACRO",
+    "FMAKUNBOUND",
+    "%SET-CLASS",
+    "%SET-CLASS-DATA",
+    "%UPDATE-CLASS",
+    "%MAKE-PACKAGE",
+    "%FORGET-PACKAGE",
+    "USE-PACKAGE",
+    "EXPORT",
+    "IMPORT",
+    "SHADOW",
+    "INTERN",
+    "UNINTERN",
 ];
 
 /// Functions written in ESL that give the time.
@@ -144,8 +182,7 @@ const CLOCKS: &[&str] = &["GET-DECODED-TIME"];
 pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
     let module = program.module();
     let sees_variables = match grain {
-        Grain::Ticks => return Vec::new(),
-        Grain::Variables => true,
+        Grain::Ticks | Grain::Variables => true,
         Grain::Changes | Grain::Reads => false,
     };
     let mut forms = SourceForms::default();
@@ -154,6 +191,9 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
         let is_toplevel = module.toplevel.iter().any(|toplevel| toplevel.0 as usize == number);
         for (pc, instr) in instructions(function) {
             let Some(kind) = kind_of(module, function, instr) else { continue };
+            if grain == Grain::Ticks && kind != UnseenKind::Definition {
+                continue;
+            }
             let place = place(module, function, pc);
             let mut is_of = |operator| {
                 place.is_some_and(|(source, line, column)| {
@@ -170,6 +210,13 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
                 UnseenKind::Pair => is_of("loop"),
                 // The calls of a slot's writer are instructions of the caller.
                 UnseenKind::Slot => is_of("defstruct"),
+                // A form at top level runs while no other task does, as a rule; the modules of the machine
+                // define nothing that others could miss.
+                UnseenKind::Definition => {
+                    is_toplevel
+                        || place
+                            .is_some_and(|(source, ..)| module.sources[source].starts_with(MODULE_SOURCES))
+                }
                 _ => false,
             };
             if is_known || found.iter().any(|change| change.kind == kind) {
@@ -216,10 +263,7 @@ pub fn reads_clock(program: &Program) -> bool {
 
 /// Returns the name of the function that an instruction calls or refers to.
 fn function_named(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<Symbol> {
-    let constant = |index: usize| match module.constants.get(function.constants.get(index)?.0 as usize)? {
-        Constant::Symbol(symbol) => Some(symbol.clone()),
-        _ => None,
-    };
+    let constant = |index: usize| constant(module, function, index);
     match instr {
         Instr::CallBuiltin { builtin: number, .. } | Instr::TailCallBuiltin { builtin: number, .. } => {
             Some(Builtin::from_number(number.0)?.symbol())
@@ -233,10 +277,23 @@ fn function_named(module: &Module, function: &ModuleFunction, instr: Instr) -> O
     }
 }
 
+/// Returns the symbol that is a constant of a function.
+fn constant(module: &Module, function: &ModuleFunction, index: usize) -> Option<Symbol> {
+    match module.constants.get(function.constants.get(index)?.0 as usize)? {
+        Constant::Symbol(symbol) => Some(symbol.clone()),
+        _ => None,
+    }
+}
+
 /// Returns the kind of change that an instruction makes, if it makes one.
 fn kind_of(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<UnseenKind> {
     match instr {
-        Instr::SetSymbolValue { .. } => Some(UnseenKind::Variable),
+        Instr::SetSymbolValue { symbol, .. } => Some(match constant(module, function, symbol.0 as usize) {
+            Some(symbol) if symbol.is_in(CL_PACKAGE) || symbol.is_in(ESL_PACKAGE) => {
+                UnseenKind::LibraryVariable
+            }
+            _ => UnseenKind::Variable,
+        }),
         Instr::BoxSet { .. } | Instr::CaptureBoxSet { .. } => Some(UnseenKind::Captured),
         Instr::SetSlot { .. } => Some(UnseenKind::Slot),
         Instr::VectorSet { .. } | Instr::VectorSetInt { .. } | Instr::ArraySet { .. } => {
@@ -260,6 +317,7 @@ fn kind_of_function(symbol: &Symbol) -> Option<UnseenKind> {
             Shares::Tables => Some(UnseenKind::Table),
             Shares::Properties => Some(UnseenKind::Property),
             Shares::Variables => Some(UnseenKind::Variable),
+            Shares::Own if DEFINING.contains(&symbol.name()) => Some(UnseenKind::Definition),
             Shares::Nothing | Shares::Points | Shares::Clock | Shares::Own => None,
         };
     }
@@ -306,6 +364,12 @@ mod tests {
             ("(defvar *h* (make-hash-table)) (remhash 1 *h*)", &[Table]),
             ("(defun note () (setf (get 'robot 'state) 1)) (note)", &[Property]),
             ("(eval (list 'print 1))", &[Code]),
+            ("(defun f () 1) (defclass tank () ()) (defmethod level ((tank tank)) 1)", &[]),
+            ("(defun f () (setf (symbol-function 'g) (lambda () 1)))", &[Definition]),
+            ("(defun f () (defun g () 1))", &[Definition]),
+            ("(defun f (x) (change-class x 'tank))", &[Definition]),
+            ("(defun f (name) (intern name))", &[Definition]),
+            ("(defun f () (setq *print-length* 3))", &[LibraryVariable]),
         ];
         for (text, expected) in expected {
             assert_eq!(kinds(text), *expected, "{text}");
@@ -314,6 +378,11 @@ mod tests {
 
     #[test]
     fn the_lists_of_functions_in_esl_have_no_builtin_and_no_other_name() {
+        for name in DEFINING {
+            let symbols = [Symbol::cl(name), Symbol::esl(name)];
+            let builtin = symbols.iter().find_map(Builtin::named);
+            assert_eq!(builtin.map(|builtin| builtin.info().shares), Some(Shares::Own), "{name}");
+        }
         let names = CHANGING.iter().flat_map(|(_, names)| *names).chain(CLOCKS);
         for name in names {
             let symbols = [Symbol::cl(name), Symbol::esl(name)];

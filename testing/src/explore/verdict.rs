@@ -64,6 +64,11 @@ impl ExplorationScope {
             Some(SearchLimit::Faults) => "more choices that are not the first were not tried",
             Some(SearchLimit::Asked) => "the time is over",
             None if self.unseen.is_empty() => return None,
+            None if let Some(change) =
+                self.unseen.iter().find(|change| change.kind == UnseenKind::Definition) =>
+            {
+                return Some(format!("no grain sees {change}"));
+            }
             None => {
                 let unseen: Vec<String> = self.unseen.iter().map(ToString::to_string).collect();
                 let is_coarse = |change: &UnseenChange| change.kind <= UnseenKind::Variable;
