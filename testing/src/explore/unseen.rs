@@ -144,12 +144,7 @@ const CHANGING: &[(UnseenKind, &[&str])] = &[
             "%ENSURE-GENERIC",
             "%ADD-METHOD",
             "CHANGE-CLASS",
-            "REMOVE-METHOD",
             "MAKE-PACKAGE",
-            "RENAME-PACKAGE",
-            "DELETE-PACKAGE",
-            "UNUSE-PACKAGE",
-            "UNEXPORT",
             "SHADOWING-IMPORT",
             "GENTEMP",
         ],
@@ -171,7 +166,6 @@ const DEFINING: &[&str] = &[
     "IMPORT",
     "SHADOW",
     "INTERN",
-    "UNINTERN",
 ];
 
 /// Functions written in ESL that give the time.
