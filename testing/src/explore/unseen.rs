@@ -13,7 +13,7 @@ use std::fmt;
 use esl::program::Program;
 use esl_bytecode::builtin::{Builtin, Shares};
 use esl_bytecode::compile::MODULE_SOURCES;
-use esl_bytecode::module::{Constant, Module, ModuleFunction};
+use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
 
@@ -43,6 +43,9 @@ pub enum UnseenKind {
     Property,
     /// Of whatever code changes that is made while the program runs.
     Code,
+    /// Of functions, classes and packages by forms at top level that are evaluated while tasks may run, which
+    /// only grain `ticks` sees.
+    LateDefinition,
     /// Of functions, classes and packages by functions of the program, which no grain sees: states leave them
     /// out.
     Definition,
@@ -61,6 +64,7 @@ impl fmt::Display for UnseenKind {
             UnseenKind::Table => "changes of hash tables",
             UnseenKind::Property => "changes of properties of symbols",
             UnseenKind::Code => "what code does that is made at run time",
+            UnseenKind::LateDefinition => "definitions while tasks run",
             UnseenKind::Definition => "changes of functions, classes and packages",
         })
     }
@@ -145,7 +149,6 @@ const CHANGING: &[(UnseenKind, &[&str])] = &[
             "%ADD-METHOD",
             "CHANGE-CLASS",
             "MAKE-PACKAGE",
-            "SHADOWING-IMPORT",
             "GENTEMP",
         ],
     ),
@@ -165,6 +168,7 @@ const DEFINING: &[&str] = &[
     "EXPORT",
     "IMPORT",
     "SHADOW",
+    "SHADOWING-IMPORT",
     "INTERN",
 ];
 
@@ -179,12 +183,18 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
         Grain::Ticks | Grain::Variables => true,
         Grain::Changes | Grain::Reads => false,
     };
+    let late = first_late_form(module);
     let mut forms = SourceForms::default();
     let mut found: Vec<UnseenChange> = Vec::new();
     for (number, function) in module.functions.iter().enumerate() {
-        let is_toplevel = module.toplevel.iter().any(|toplevel| toplevel.0 as usize == number);
+        let form = module.toplevel.iter().position(|toplevel| toplevel.0 as usize == number);
+        let is_toplevel = form.is_some();
         for (pc, instr) in instructions(function) {
             let Some(kind) = kind_of(module, function, instr) else { continue };
+            let kind = match kind {
+                UnseenKind::Definition if form.is_some_and(|form| form >= late) => UnseenKind::LateDefinition,
+                kind => kind,
+            };
             if grain == Grain::Ticks && kind != UnseenKind::Definition {
                 continue;
             }
@@ -204,8 +214,8 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
                 UnseenKind::Pair => is_of("loop"),
                 // The calls of a slot's writer are instructions of the caller.
                 UnseenKind::Slot => is_of("defstruct"),
-                // A form at top level runs while no other task does, as a rule; the modules of the machine
-                // define nothing that others could miss.
+                // A form at top level that no task runs beside; the modules of the machine define nothing that
+                // others could miss.
                 UnseenKind::Definition => {
                     is_toplevel
                         || place
@@ -226,6 +236,40 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
     }
     found.sort_by_key(|change| change.kind);
     found
+}
+
+/// Returns the number of the first form at top level beside which a task may run: those of `spawn` outlive the
+/// form that makes them, and it, or a function that it calls, may spawn.
+fn first_late_form(module: &Module) -> usize {
+    let is_spawn = |function: &ModuleFunction, instr| {
+        function_named(module, function, instr).is_some_and(|symbol| symbol == Symbol::esl("%SPAWN"))
+    };
+    let all = module.functions.iter();
+    if !all.clone().any(|function| instructions(function).any(|(_, instr)| is_spawn(function, instr))) {
+        return usize::MAX;
+    }
+    let may_spawn = |function: &ModuleFunction| {
+        let runs = |instr| match instr {
+            Instr::CallGlobal { symbol, .. } | Instr::TailCallGlobal { symbol, .. } => {
+                let symbol = constant(module, function, symbol.0 as usize);
+                symbol.is_none_or(|symbol| !symbol.is_in(CL_PACKAGE) && !symbol.is_in(ESL_PACKAGE))
+            }
+            Instr::MakeClosure { .. } => true,
+            Instr::LoadConst { constant: index, .. } => {
+                let index = function.constants.get(index.0 as usize);
+                let constant = index.and_then(|index| module.constants.get(index.0 as usize));
+                matches!(constant, Some(Constant::Function(_)))
+            }
+            instr => is_spawn(function, instr),
+        };
+        let defines =
+            |instr| kind_of(module, function, instr).is_some_and(|kind| kind == UnseenKind::Definition);
+        let is_definition = instructions(function).any(|(_, instr)| defines(instr));
+        !is_definition && instructions(function).any(|(_, instr)| runs(instr))
+    };
+    let spawning =
+        |toplevel: &FunctionNumber| module.functions.get(toplevel.0 as usize).is_some_and(may_spawn);
+    module.toplevel.iter().position(spawning).map_or(usize::MAX, |form| form + 1)
 }
 
 /// Returns the instructions of a function, each with its place in the code.
@@ -363,6 +407,11 @@ mod tests {
             ("(defun f () (defun g () 1))", &[Definition]),
             ("(defun f (x) (change-class x 'tank))", &[Definition]),
             ("(defun f (name) (intern name))", &[Definition]),
+            ("(spawn (print 1)) (defun f () 1)", &[LateDefinition]),
+            ("(defun go-on () (spawn (print 1))) (defun f () 1) (go-on)", &[]),
+            ("(defun go-on () (spawn (print 1))) (go-on) (defun f () 1)", &[LateDefinition]),
+            ("(print (mapcar (lambda (x) (spawn x)) '(1))) (defun f () 1)", &[LateDefinition]),
+            ("(task-net (a (print 1)) (b (print 2))) (defun f () 1)", &[]),
             ("(defun f () (setq *print-length* 3))", &[LibraryVariable]),
         ];
         for (text, expected) in expected {
