@@ -40,7 +40,7 @@ impl Numbers<'_> {
         }
         self.fail(NumberFailure::Arithmetic(
             op,
-            format!("the result would have {bits} bits, the limit is {BIT_LIMIT}"),
+            format!("the result would have more than {BIT_LIMIT} bits, the limit of an integer"),
         ))
     }
 
