@@ -53,6 +53,16 @@ pub(crate) fn start_broker(program: &str, folder: &Folder, more: &str) -> (Broke
     panic!("no broker could be started");
 }
 
+/// Returns the lines that a program prints, which may reach a broker and is given its port.
+pub(crate) fn printed_by(folder: &Folder, program: &str, port: u16) -> Vec<String> {
+    folder.file("main.esl", program);
+    let port = port.to_string();
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &port]);
+    let run = process::run(command.current_dir(folder.path()), "");
+    let output = run.quiet_output().expect("nothing is wrong");
+    output.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned).collect()
+}
+
 #[test]
 fn messages_go_through_a_broker() {
     let Some(program) = broker_program() else {
@@ -87,12 +97,7 @@ fn messages_go_through_a_broker() {
     (cause (mqtt:publish a \"robot/+\" \"x\"))))
 (cause (mqtt:with-client (c \"127.0.0.1\" 1) c))
 (cause (mqtt:with-client (c \"localhost\" 1883) c))";
-    folder.file("main.esl", text);
-    let port = port.to_string();
-    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &port]);
-    let output =
-        process::run(command.current_dir(folder.path()), "").quiet_output().expect("nothing is wrong");
-    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let lines = printed_by(&folder, text, port);
     let expected = [
         "(\"robot/1/state\" \"fährt\" NIL)",
         "(\"robot/1/state\" #(102 195 164 104 114 116) NIL)",
@@ -381,11 +386,6 @@ fn a_secured_broker_acknowledges_what_is_published() {
     (print (multiple-value-list (wait-for-event (mqtt:subscribe d \"kept/#\"))))))
 (cause (mqtt:with-client (c \"127.0.0.1\" *port* :tls t) c))
 (cause (mqtt:with-client (c \"127.0.0.1\" *port* :tls t :ca-file \"/none.pem\") c))";
-    folder.file("main.esl", text);
-    let port = port.to_string();
-    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &port]);
-    let output =
-        process::run(command.current_dir(folder.path()), "").quiet_output().expect("nothing is wrong");
-    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let lines = printed_by(&folder, text, port);
     assert_eq!(lines, ["(\"kept/x\" \"149\" T)", ":TLS-ERROR", ":PERMISSION-DENIED"]);
 }

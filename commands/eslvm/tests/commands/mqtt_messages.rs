@@ -8,7 +8,7 @@ use esl_conformance::folder::Folder;
 use esl_conformance::process;
 
 use crate::eslvm;
-use crate::mqtt::{broker_program, read_packet, start_broker};
+use crate::mqtt::{broker_program, printed_by, read_packet, start_broker};
 
 /// Topics that begin with `$` are for filters that say so. What the protocol does not allow is not sent.
 #[test]
@@ -62,12 +62,7 @@ fn wildcards_leave_out_the_topics_of_the_broker() {
 (try :id (string (code-char 0)))
 (try :user (make-string 65536 :initial-element #\\a))
 (try :user \"a\" :password (make-string 65536 :initial-element #\\a))";
-    folder.file("main.esl", text);
-    let port = port.to_string();
-    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &port]);
-    let output =
-        process::run(command.current_dir(folder.path()), "").quiet_output().expect("nothing is wrong");
-    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let lines = printed_by(&folder, text, port);
     let expected = [
         "(\"$SYS/broker/version\" \"$SYS/broker/version\")",
         "((\"a/broker/x\" \"1\") (\"/\" \"2\") (\"a/broker/x\" \"1\"))",
