@@ -56,7 +56,7 @@ fn process_failure(reason: impl ToString) -> HostFailure {
     HostFailure::new("PROCESS-ERROR", reason)
 }
 
-/// Where the output of a launched program goes: to the connection that a socket becomes, nowhere for `NIL`,
+/// The destination of a launched program's output: to the connection that a socket becomes, nowhere for `NIL`,
 /// and for anything else to where that of this process goes.
 enum OutputTarget {
     Nowhere,

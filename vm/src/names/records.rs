@@ -53,7 +53,7 @@ define_records! {
     /// A child of a supervisor.
     child { ID, FUNCTION, STARTER, RESTART, PAUSES, BACKOFF, TASK, BEGUN, DUE }
 
-    /// Where a failure began.
+    /// The origin of a failure.
     history { FRAMES, RECOVERIES, ORIGIN, CAUSES }
 
     /// A frame of a backtrace.
