@@ -63,8 +63,8 @@ pub use secrets::SecretsError;
 pub struct ServedPlaces {
     /// Address at which figures of the run are served to Prometheus.
     pub metrics: Option<SocketAddr>,
-    /// The address at which operators attach: the path of a socket that only its owner can open, or an address as
-    /// [`parse_address`] takes it, which asks for a secret.
+    /// The address at which operators attach: the path of a socket that only its owner can open, or an
+    /// address as [`parse_address`] takes it, which asks for a secret.
     pub listen: Option<String>,
     /// Address at which the run is shown in a browser.
     pub monitor: Option<SocketAddr>,

@@ -56,8 +56,8 @@ fn process_failure(reason: impl ToString) -> HostFailure {
     HostFailure::new("PROCESS-ERROR", reason)
 }
 
-/// The destination of a launched program's output: to the connection that a socket becomes, nowhere for `NIL`,
-/// and for anything else to where that of this process goes.
+/// The destination of a launched program's output: a socket's connection; nothing, for `NIL`; for anything
+/// else, the destination of this process's output.
 enum OutputTarget {
     Nowhere,
     Inherited,

@@ -214,8 +214,8 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
                 UnseenKind::Pair => is_of("loop"),
                 // The calls of a slot's writer are instructions of the caller.
                 UnseenKind::Slot => is_of("defstruct"),
-                // A form at top level that no task runs beside; the modules of the machine define nothing that
-                // others could miss.
+                // A form at top level that no task runs beside; the modules of the machine define nothing
+                // that others could miss.
                 UnseenKind::Definition => {
                     is_toplevel
                         || place
@@ -238,8 +238,8 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
     found
 }
 
-/// Returns the number of the first form at top level beside which a task may run: those of `spawn` outlive the
-/// form that makes them, and it, or a function that it calls, may spawn.
+/// Returns the number of the first form at top level beside which a task may run: those of `spawn` outlive
+/// the form that makes them, and it, or a function that it calls, may spawn.
 fn first_late_form(module: &Module) -> usize {
     let is_spawn = |function: &ModuleFunction, instr| {
         function_named(module, function, instr).is_some_and(|symbol| symbol == Symbol::esl("%SPAWN"))
