@@ -1,4 +1,5 @@
-//! Compiles the library to its image, file by file in the order of `load-order`.
+//! Compiles the library to its images, file by file in the order of `load-order`: that of every machine, and
+//! that of the part for operators, which is in the folder `operators/`.
 //!
 //! One machine runs the macros and loads each file after its compilation, so that files can use the
 //! definitions of earlier ones. An error in the library is an error of the build. A warning is a warning of
@@ -28,20 +29,36 @@ use esl_vm::vm::{Config, Vm};
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-changed=load-order");
+    PARTS.iter().for_each(|part| println!("cargo::rerun-if-changed={}load-order", part.folder));
     let folder =
         PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo names the folder of the package"));
     let output =
         PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo names the folder for what is built"));
     std::fs::write(output.join("sources.rs"), sources(&folder)).expect("the list of sources can be written");
     match build(&folder) {
-        Ok(image) => std::fs::write(output.join("image.eslb"), image).expect("the image can be written"),
+        Ok(images) => {
+            for (part, image) in PARTS.iter().zip(images) {
+                std::fs::write(output.join(part.image), image).expect("the image can be written");
+            }
+        }
         Err(text) => {
             eprintln!("{text}");
             std::process::exit(1);
         }
     }
 }
+
+/// A part of the library, which is compiled to an image.
+struct Part {
+    /// Its folder, with a slash at its end unless it is that of the package.
+    folder: &'static str,
+    /// The file of its image.
+    image: &'static str,
+}
+
+/// All parts, in the order in which they are compiled: a part knows those before it.
+const PARTS: [Part; 2] =
+    [Part { folder: "", image: "library.eslb" }, Part { folder: "operators/", image: "operators.eslb" }];
 
 /// Reason why there is no image.
 enum BuildError {
@@ -85,39 +102,43 @@ impl fmt::Display for BuildError {
     }
 }
 
-/// Returns the names of the files of the library, in the order in which they are loaded.
-fn load_order(folder: &Path) -> Result<Vec<String>, BuildError> {
-    let order = read(&folder.join("load-order"))?;
+/// Returns the names of the files of a part, in the order in which they are loaded.
+fn load_order(folder: &Path, part: &Part) -> Result<Vec<String>, BuildError> {
+    let order = read(&folder.join(format!("{}load-order", part.folder)))?;
     let names = order.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
-    Ok(names.map(str::to_owned).collect())
+    Ok(names.map(|name| format!("{}{name}", part.folder)).collect())
 }
 
 /// Returns the list of sources, as Rust.
 fn sources(folder: &Path) -> String {
-    let names = load_order(folder).unwrap_or_default();
-    let row = |name: &String| {
+    let names = PARTS.iter().flat_map(|part| load_order(folder, part).unwrap_or_default());
+    let row = |name: String| {
         let file = format!("concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/{name}.esl\")");
         format!("(\"stdlib/{name}.esl\", include_str!({file})),\n")
     };
-    format!("&[\n{}]", names.iter().map(row).collect::<String>())
+    format!("&[\n{}]", names.map(row).collect::<String>())
 }
 
-/// Returns the bytes of the image.
-fn build(folder: &Path) -> Result<Vec<u8>, BuildError> {
+/// Returns the bytes of the images.
+fn build(folder: &Path) -> Result<Vec<Vec<u8>>, BuildError> {
     let machine = Vm::new(Config::default(), Box::new(VirtualHost::new()));
     let machine = machine.map_err(|_| BuildError::NoMemory)?;
     let mut library =
         LibraryBuild { machine, sources: Sources::new(), modules: Vec::new(), doubts: Vec::new() };
     library.machine.set_compiler(Box::new(Compiler::default()));
-    for name in load_order(folder)? {
-        let path = folder.join(format!("{name}.esl"));
-        println!("cargo::rerun-if-changed={}", path.display());
-        library.add(&format!("stdlib/{name}.esl"), read(&path)?.into())?;
+    let mut images = Vec::new();
+    for part in &PARTS {
+        for name in load_order(folder, part)? {
+            let path = folder.join(format!("{name}.esl"));
+            println!("cargo::rerun-if-changed={}", path.display());
+            library.add(&format!("stdlib/{name}.esl"), read(&path)?.into())?;
+        }
+        library.report_doubts();
+        let module = esl_vm::load::prepare(link::link(std::mem::take(&mut library.modules)));
+        images.push(file::write(&module).map_err(BuildError::NotWritten)?);
     }
-    library.report_doubts();
     library.check_fields()?;
-    let module = esl_vm::load::prepare(link::link(library.modules));
-    file::write(&module).map_err(BuildError::NotWritten)
+    Ok(images)
 }
 
 fn read(path: &Path) -> Result<String, BuildError> {
@@ -128,6 +149,7 @@ fn read(path: &Path) -> Result<String, BuildError> {
 struct LibraryBuild {
     machine: Vm,
     sources: Sources,
+    /// The modules of the part that is compiled.
     modules: Vec<Module>,
     /// Warnings about names that were not defined when they were used.
     doubts: Vec<Diagnostic>,

@@ -92,6 +92,8 @@ pub enum OperateError {
     Address(SocketAddr, io::Error),
     /// The event loop cannot be started.
     EventLoop(NoEventLoop),
+    /// The part of the library for operators cannot be loaded.
+    Library(esl::Error),
 }
 
 impl fmt::Display for OperateError {
@@ -113,6 +115,7 @@ impl fmt::Display for OperateError {
             }
             OperateError::Address(address, error) => write!(f, "cannot listen at {address}: {error}"),
             OperateError::EventLoop(error) => write!(f, "the event loop cannot be started: {error}"),
+            OperateError::Library(error) => error.fmt(f),
         }
     }
 }
@@ -221,6 +224,19 @@ pub fn parse_address(text: &str) -> Result<SocketAddr, &'static str> {
 }
 
 impl ServedPlaces {
+    /// Loads the functions of the library that the services call into a machine that is about to run a program.
+    /// [`begin`](Self::begin) does that too; to record the run, call this before anything else changes the
+    /// machine, as a replay does.
+    ///
+    /// # Errors
+    /// [`OperateError::Library`].
+    pub fn prepare(&self, machine: &mut Vm) -> Result<(), OperateError> {
+        if self.listen.is_none() && self.monitor.is_none() {
+            return Ok(());
+        }
+        esl::program::load_operators(machine).map_err(OperateError::Library)
+    }
+
     /// Begins to serve the run of a program of this name, before the machine runs it. `say` is told, line by
     /// line, where what is served. Returns what is to be told of the end, and dropped after the run.
     ///
@@ -232,6 +248,7 @@ impl ServedPlaces {
         program: &str,
         say: &mut dyn FnMut(&str),
     ) -> Result<ServedRun, OperateError> {
+        self.prepare(machine)?;
         let scope = RunScope::new(machine);
         let mut served = ServedRun::default();
         // Whether an operator may attach that can signal an input.

@@ -35,7 +35,7 @@ use super::records::{self, Before};
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
 /// The version of the format that this library reads and writes.
-pub const FORMAT: u32 = 5;
+pub const FORMAT: u32 = 6;
 
 /// Length of what is before the content of a frame.
 const FRAME: usize = 11;
@@ -80,6 +80,8 @@ pub struct Beginning {
     pub schedule: Option<String>,
     /// The functions of the embedder's.
     pub functions: Vec<GivenFunction>,
+    /// Whether the machine has the functions of the library that serve operators.
+    pub has_operators: bool,
     /// Identity of the machine and its library.
     pub(super) identity: String,
 }
@@ -181,6 +183,7 @@ pub(super) fn beginning_bytes(beginning: &Beginning) -> Vec<u8> {
             out.number(need.argument as u64);
         });
     });
+    out.byte(beginning.has_operators.into());
     out.bytes(&beginning.program);
     frame(&mut bytes, kind::HEADER, &out.0);
     bytes
@@ -204,6 +207,7 @@ fn read_beginning(content: &[u8]) -> Option<Beginning> {
         })?;
         Some(GivenFunction { name, is_operation, needs })
     })?;
+    let has_operators = from.flag()?;
     let program = from.bytes()?.to_vec();
     from.is_empty().then_some(Beginning {
         program,
@@ -213,6 +217,7 @@ fn read_beginning(content: &[u8]) -> Option<Beginning> {
         program_file,
         schedule,
         functions,
+        has_operators,
         identity,
     })
 }

@@ -129,8 +129,8 @@ pub fn record(
     Ok(summary)
 }
 
-/// Returns what the run of a program begins with, in a machine that has the embedder's functions already. The
-/// folders of modules and the traces are to be set after that.
+/// Returns what the run of a program begins with, in a machine that has the embedder's functions already, and
+/// the part of the library for operators if its run is served to them.
 ///
 /// # Errors
 /// [`WriteError`], if the program contains an object that no file can hold.
@@ -148,6 +148,7 @@ pub fn beginning(program: &Program, setup: &RunSetup, machine: &Vm) -> Result<Be
         program_file: setup.program_file.clone(),
         schedule: setup.schedule.as_ref().map(Schedule::to_string),
         functions: functions.collect(),
+        has_operators: program::has_operators(machine),
         identity: ExecutionIdentity::current().to_string(),
     })
 }

@@ -185,6 +185,9 @@ impl Rerun {
 fn begin(recorded: &Recorded, program: &Program, host: ReplayHost) -> Result<(Vm, TaskId), Error> {
     let beginning = &recorded.beginning;
     let mut machine = program::machine(beginning.config.clone(), Box::new(host))?;
+    if beginning.has_operators {
+        program::load_operators(&mut machine)?;
+    }
     for given in &beginning.functions {
         // They are never called: the host answers in their place.
         let function = if given.is_operation {

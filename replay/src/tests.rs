@@ -88,6 +88,7 @@ fn beginning() -> Beginning {
         folders: vec![".".into()],
         program_file: vec!["main.esl".into(), "/main.esl".into()],
         functions: vec![GivenFunction { name: "F".into(), is_operation: true, needs: Vec::new() }],
+        has_operators: true,
         identity: ExecutionIdentity::current().to_string(),
     }
 }

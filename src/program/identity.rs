@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use esl_bytecode::file::{BUILTIN_TABLE, OPCODE_TABLE, checksum};
+use esl_bytecode::file::{BUILTIN_TABLE, OPCODE_TABLE};
 
 pub use esl_vm::EXECUTION_EPOCH;
 
@@ -35,7 +35,7 @@ impl ExecutionIdentity {
             epoch: EXECUTION_EPOCH,
             opcodes: OPCODE_TABLE,
             builtins: BUILTIN_TABLE,
-            library: checksum(esl_stdlib::IMAGE).unwrap_or(0),
+            library: esl_stdlib::checksum(),
         }
     }
 }

@@ -4,8 +4,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::session::Compiler;
-use esl_host::{Host, HostOperation, ProcessSignal};
-use esl_vm::embed::HostFunction;
+use esl_host::{Host, ProcessSignal};
 use esl_vm::explore::Settings;
 use esl_vm::heap::HeapStats;
 use esl_vm::run::RunOutcome;
@@ -109,17 +108,22 @@ pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, Error> 
     esl_stdlib::load(&mut machine).map_err(|_| Error::NoMemory("the library"))?;
     #[cfg(feature = "world")]
     esl_world::install_modules(&mut machine);
-    install_nobody(&mut machine);
     machine.begin_program(config);
     Ok(machine)
 }
 
-/// Gives a machine that nobody attends the functions by which the library tells operators something.
-fn install_nobody(machine: &mut Vm) {
-    let ignore = |_: &[Datum]| Ok(Datum::nil(Default::default()));
-    machine.add_host_function("%TELL-OPERATOR", HostFunction::AtOnce(Box::new(ignore)));
-    let ignore = |operation: HostOperation| operation.complete(Vec::new());
-    machine.add_host_function("%WRITE-OPERATOR", HostFunction::Operation(Box::new(ignore)));
+/// Loads the functions of the library that serve operators into a machine, unless it has them. Before the
+/// program begins, since a replay loads them there.
+///
+/// # Errors
+/// [`Error::NoMemory`].
+pub fn load_operators(machine: &mut Vm) -> Result<(), Error> {
+    esl_stdlib::load_operators(machine).map_err(|_| Error::NoMemory("the part of the library for operators"))
+}
+
+/// Returns whether a machine has the functions of the library that serve operators.
+pub fn has_operators(machine: &Vm) -> bool {
+    esl_stdlib::has_operators(machine)
 }
 
 /// Has a machine write to its error output what happens to `failures`, `goals` or `tasks`. Nothing changes if
@@ -350,6 +354,7 @@ mod tests {
 
     use super::*;
     use crate::program::{Source, compile};
+    use esl_vm::embed::HostFunction;
 
     #[test]
     fn an_end_ends_though_cleanups_make_tasks_that_have_cleanups() {

@@ -1,22 +1,30 @@
 //! The ESL library, written in ESL, as a compiled image.
 //!
-//! The build step compiles the files of this package to one module, which is embedded in every executable. A
-//! machine maps it, and decodes a function at its first call.
+//! The build step compiles the files of this package to a module, which is embedded in every executable. A
+//! machine maps it, and decodes a function at its first call. The functions that serve operators are a second
+//! module, which the machine gets only if its run is served.
 #![forbid(unsafe_code)]
 
 use std::fmt;
 
-use esl_bytecode::file::{ImageBytes, ModuleImage};
+use esl_bytecode::file::{self, ImageBytes, ModuleImage};
 use esl_bytecode::symbol::{ESL_PACKAGE, USER_PACKAGE};
 use esl_vm::load::LoadError;
 use esl_vm::run::CallError;
 use esl_vm::vm::Vm;
 
-/// The image: the bytes of an `.eslb` file.
-pub static IMAGE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/image.eslb"));
+/// The image of the library: the bytes of an `.eslb` file.
+static LIBRARY: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/library.eslb"));
+
+/// The image of the part for operators, which a machine has only if its run is served to operators.
+static OPERATORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/operators.eslb"));
+
+/// Names of the images in a machine.
+const LIBRARY_NAME: &str = "library";
+const OPERATORS_NAME: &str = "operators";
 
 /// The texts of the library, in the order in which they are loaded: the names of the files, as backtraces and
-/// diagnostics have them, and what is in them.
+/// diagnostics have them, and what is in them. Those of the part for operators are the last.
 pub static SOURCES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/sources.rs"));
 
 /// Reason why a machine does not get the library. With an intact image, that is want of memory.
@@ -44,12 +52,37 @@ impl std::error::Error for StdlibError {}
 /// # Errors
 /// [`StdlibError`], if the machine's limit of memory leaves no room for the library.
 pub fn load(machine: &mut Vm) -> Result<(), StdlibError> {
-    let image = ModuleImage::open_trusted(ImageBytes::Static(IMAGE));
+    open(machine, LIBRARY_NAME, LIBRARY)
+}
+
+/// Loads the functions that serve operators into a machine that has the library, unless it has them.
+///
+/// # Errors
+/// [`StdlibError`], if the machine's limit of memory leaves no room for them.
+pub fn load_operators(machine: &mut Vm) -> Result<(), StdlibError> {
+    if has_operators(machine) { Ok(()) } else { open(machine, OPERATORS_NAME, OPERATORS) }
+}
+
+/// Returns whether a machine has the functions that serve operators.
+pub fn has_operators(machine: &Vm) -> bool {
+    machine.image_names().any(|name| name == OPERATORS_NAME)
+}
+
+/// Returns a checksum of all images.
+pub fn checksum() -> u32 {
+    let of = |image| file::checksum(image).unwrap_or(0);
+    of(LIBRARY) ^ of(OPERATORS).rotate_left(16)
+}
+
+fn open(machine: &mut Vm, name: &'static str, bytes: &'static [u8]) -> Result<(), StdlibError> {
+    let image = ModuleImage::open_trusted(ImageBytes::Static(bytes));
     let image = image.map_err(|error| StdlibError::Image(error.into()))?;
     let no_room = |error| StdlibError::Image(LoadError::Alloc(error));
     machine.enter_package(ESL_PACKAGE).map_err(no_room)?;
-    let functions = machine.open_image(image).map_err(StdlibError::Image)?;
-    machine.run_toplevel(functions, u64::MAX).map_err(StdlibError::Toplevel)?;
+    let functions = machine.open_image(name, image).map_err(StdlibError::Image)?;
+    if !functions.is_nil() {
+        machine.run_toplevel(functions, u64::MAX).map_err(StdlibError::Toplevel)?;
+    }
     machine.enter_package(USER_PACKAGE).map_err(no_room)?;
     machine.seal();
     Ok(())
@@ -60,32 +93,36 @@ mod tests {
     use super::*;
     use esl_bytecode::builtin::BUILTINS;
 
+    fn forms_at_start(image: &'static [u8]) -> usize {
+        let image = ModuleImage::open_trusted(ImageBytes::Static(image)).expect("the image is sound");
+        image.toplevel().expect("the image is sound").len()
+    }
+
     #[test]
     fn few_forms_run_when_a_machine_is_made() {
-        let image = ModuleImage::open_trusted(ImageBytes::Static(IMAGE)).expect("the image is sound");
-        let count = image.toplevel().expect("the image is sound").len();
+        let count = forms_at_start(LIBRARY);
         assert!(
             count <= 9,
             "{count} forms of the library run at each start; `esl_vm::load::prepare` notes plain definitions"
         );
     }
 
+    /// A form would make a task, and the numbers of a program's tasks would differ between runs with and
+    /// without operators.
+    #[test]
+    fn no_form_runs_when_the_part_for_operators_is_loaded() {
+        assert_eq!(forms_at_start(OPERATORS), 0);
+    }
+
     #[test]
     fn each_name_is_defined_once() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-        let mut places = std::collections::BTreeMap::<String, Vec<String>>::new();
-        for file in std::fs::read_dir(folder).expect("the folder can be read") {
-            let path = file.expect("the folder can be read").path();
-            if path.extension().is_none_or(|extension| extension != "esl") {
-                continue;
-            }
-            let text = std::fs::read_to_string(&path).expect("the file can be read");
+        let mut places = std::collections::BTreeMap::<String, Vec<&str>>::new();
+        for (file, text) in SOURCES {
             let names = text.lines().filter_map(|line| {
                 let rest = line.strip_prefix("(defun ").or_else(|| line.strip_prefix("(defmacro "))?;
                 rest.split([' ', ')']).next().filter(|name| !name.starts_with('('))
             });
-            let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            names.for_each(|name| places.entry(name.to_owned()).or_default().push(file.clone()));
+            names.for_each(|name| places.entry(name.to_owned()).or_default().push(*file));
         }
         let defined: std::collections::BTreeSet<String> = places.keys().cloned().collect();
         let twice: Vec<_> = places.into_iter().filter(|(_, files)| files.len() > 1).collect();

@@ -62,20 +62,34 @@ pub struct OperateOptions {
 }
 
 impl OperateOptions {
+    fn places(&self) -> ServedPlaces {
+        ServedPlaces {
+            metrics: self.metrics,
+            listen: self.listen.clone(),
+            monitor: self.monitor,
+            secrets: self.secrets.clone(),
+            identity: self.certificate.clone().zip(self.key.clone()),
+        }
+    }
+
+    /// Loads the functions of the library that the services call, before anything else changes the machine.
+    ///
+    /// # Errors
+    /// The exit status, after a message.
+    pub fn prepare(&self, machine: &mut Vm) -> Result<(), u8> {
+        self.places().prepare(machine).map_err(|error| {
+            complain(error);
+            USAGE
+        })
+    }
+
     /// Begins to serve what was asked for, before the machine runs a program of this name. Returns what is
     /// to be told of the end, and dropped after the run.
     ///
     /// # Errors
     /// The exit status, after a message.
     pub fn begin(&self, machine: &mut Vm, program: &str) -> Result<ServedRun, u8> {
-        let places = ServedPlaces {
-            metrics: self.metrics,
-            listen: self.listen.clone(),
-            monitor: self.monitor,
-            secrets: self.secrets.clone(),
-            identity: self.certificate.clone().zip(self.key.clone()),
-        };
-        places.begin(machine, program, &mut |line| eprintln!("{line}")).map_err(|error| {
+        self.places().begin(machine, program, &mut |line| eprintln!("{line}")).map_err(|error| {
             complain(error);
             USAGE
         })

@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn each_function_is_in_the_library() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../stdlib");
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../stdlib/operators");
         let text: String = ["slime", "slime-names", "slime-debugger", "slime-inspector"]
             .into_iter()
             .map(|file| std::fs::read_to_string(folder.join(format!("{file}.esl"))).expect("it is there"))

@@ -57,14 +57,19 @@ impl Vm {
         with_room(self, |vm| load(&mut vm.heap, &mut vm.names, module, &mut Alone::default()))
     }
 
-    /// Adds an image, such as that of the library. Returns the functions that run its top-level forms, in
-    /// order, as a list. The image counts as verified.
+    /// Adds an image, such as that of the library, under a name. Returns the functions that run its top-level
+    /// forms, in order, as a list. The image counts as verified.
     ///
     /// # Errors
     /// [`LoadError`].
-    pub fn open_image(&mut self, image: ModuleImage) -> Result<Value, LoadError> {
+    pub fn open_image(&mut self, name: &'static str, image: ModuleImage) -> Result<Value, LoadError> {
         let image = Arc::new(image);
-        with_room(self, |vm| vm.names.open_image(&mut vm.heap, image.clone()))
+        with_room(self, |vm| vm.names.open_image(&mut vm.heap, name, image.clone()))
+    }
+
+    /// Returns the names of the images, in the order in which they were added.
+    pub fn image_names(&self) -> impl Iterator<Item = &'static str> {
+        self.names.images.names()
     }
 
     /// Seals the language: from here on, its names cannot be defined again.

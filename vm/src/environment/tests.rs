@@ -78,7 +78,7 @@ fn machines(modules: Vec<Module>) -> [Vm; 2] {
     assert!(linked.toplevel.is_empty(), "all forms are definitions");
     let bytes = write(&linked).unwrap();
     let mut reading = Vm::for_tests();
-    reading.open_image(ModuleImage::open(ImageBytes::Shared(bytes.into())).unwrap()).unwrap();
+    reading.open_image("test", ModuleImage::open(ImageBytes::Shared(bytes.into())).unwrap()).unwrap();
     [running, reading]
 }
 

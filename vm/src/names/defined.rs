@@ -24,9 +24,10 @@ impl Names {
     pub(crate) fn open_image(
         &mut self,
         heap: &mut Heap,
+        name: &'static str,
         image: Arc<ModuleImage>,
     ) -> Result<Value, LoadError> {
-        let toplevel = load::open_image(heap, self, image)?;
+        let toplevel = load::open_image(heap, self, name, image)?;
         for name in self.images.exports() {
             self.packages.register(PackageId::ESL, name, true);
         }

@@ -33,6 +33,7 @@ pub(crate) struct Images(Vec<Image>);
 /// An image, and the objects made of it.
 #[derive(Clone)]
 struct Image {
+    name: &'static str,
     module: Arc<ModuleImage>,
     packages: Vec<Arc<str>>,
     definitions: Definitions,
@@ -54,6 +55,11 @@ impl Stated for Images {
 }
 
 impl Images {
+    /// Returns the names of the images.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.0.iter().map(|image| image.name)
+    }
+
     /// Calls `visit` with every object made of the images.
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         for image in &self.0 {
@@ -118,11 +124,17 @@ impl Images {
 ///
 /// # Errors
 /// [`LoadError`].
-pub(crate) fn open(heap: &mut Heap, names: &mut Names, module: Arc<ModuleImage>) -> Result<Value, LoadError> {
+pub(crate) fn open(
+    heap: &mut Heap,
+    names: &mut Names,
+    name: &'static str,
+    module: Arc<ModuleImage>,
+) -> Result<Value, LoadError> {
     let number = names.images.0.len();
     let packages = module.packages()?.into_iter().map(Arc::from).collect();
     let shape = Shape::other(CodeKind::Lazy, 0);
     let image = Image {
+        name,
         packages,
         definitions: Definitions::of(&module)?,
         symbols: trust::alloc_image_table(heap, module.symbol_count())?,

@@ -97,7 +97,7 @@ fn a_module_runs() {
 fn an_image_runs() {
     let mut vm = Vm::for_tests();
     let image = image(&module());
-    let toplevel = vm.names.open_image(&mut vm.heap, image).unwrap();
+    let toplevel = vm.names.open_image(&mut vm.heap, "test", image).unwrap();
     check_loaded(&mut vm, toplevel);
 }
 
@@ -113,7 +113,7 @@ fn definitions_of_an_image_are_there_without_running_it() {
             vm.names.intern_esl(&mut vm.heap, "ADDER").unwrap();
         }
         let image = image(&prepared);
-        let toplevel = vm.names.open_image(&mut vm.heap, image).unwrap();
+        let toplevel = vm.names.open_image(&mut vm.heap, "test", image).unwrap();
         assert_eq!(use_adder(&mut vm), Value::small(42));
         check_loaded(&mut vm, toplevel);
     }
@@ -158,7 +158,7 @@ fn classes_of_an_image_are_made_when_their_names_are_met_parents_first() {
     for first in ["ANIMAL", "BIRD"] {
         let mut vm = Vm::for_tests();
         let image = image(&prepared);
-        vm.names.open_image(&mut vm.heap, image).unwrap();
+        vm.names.open_image(&mut vm.heap, "test", image).unwrap();
         assert_eq!(vm.names.find(&Symbol::esl("BIRD")), None);
         vm.names.intern_esl(&mut vm.heap, first).unwrap();
         let [animal, bird] = ["ANIMAL", "BIRD"].map(|name| {
@@ -177,7 +177,7 @@ fn collections_do_not_harm_what_is_loaded() {
     let toplevel = vm.load_module(&module()).unwrap();
     check_loaded(&mut vm, toplevel);
     let image = image(&module());
-    let toplevel = vm.names.open_image(&mut vm.heap, image).unwrap();
+    let toplevel = vm.names.open_image(&mut vm.heap, "test", image).unwrap();
     check_loaded(&mut vm, toplevel);
 }
 

@@ -82,19 +82,9 @@ pub(crate) fn run(
         None => Box::new(host),
     };
     let mut machine = program::machine(options.config(), host).map_err(setup)?;
+    operate.prepare(&mut machine)?;
     if options.clock == ClockChoice::Real {
         esl_world::install_operations(&mut machine);
-    }
-    if let Some((recorder, path_of_record)) = &recording {
-        let folders = path.folders().iter().map(|folder| folder.to_string_lossy().into_owned()).collect();
-        let schedule = schedule.cloned();
-        let (traces, program_file) = (trace.to_vec(), path.program_file());
-        let setup = RunSetup { config: options.config(), traces, folders, program_file, schedule };
-        let beginning = esl_replay::beginning(&program, &setup, &machine).map_err(|error| {
-            complain(format_args!("{} cannot be recorded: {error}", path_of_record.display()));
-            USAGE
-        })?;
-        recorder.begin(&beginning);
     }
     signals.set(machine.inbox());
     program::set_module_path(&mut machine, path).map_err(setup)?;
@@ -119,6 +109,17 @@ pub(crate) fn run(
     }
     let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let served = operate.begin(&mut machine, &name)?;
+    if let Some((recorder, path_of_record)) = &recording {
+        let folders = path.folders().iter().map(|folder| folder.to_string_lossy().into_owned()).collect();
+        let schedule = schedule.cloned();
+        let (traces, program_file) = (trace.to_vec(), path.program_file());
+        let setup = RunSetup { config: options.config(), traces, folders, program_file, schedule };
+        let beginning = esl_replay::beginning(&program, &setup, &machine).map_err(|error| {
+            complain(format_args!("{} cannot be recorded: {error}", path_of_record.display()));
+            USAGE
+        })?;
+        recorder.begin(&beginning);
+    }
     let started = std::time::Instant::now();
     let is_profiled = profile.is_some() || stats == Some(Stats::Functions);
     let mut found = is_profiled.then(|| Profile::begin(&mut machine));
