@@ -6,17 +6,14 @@
 
 use std::convert::Infallible;
 use std::net::{IpAddr, TcpListener};
-use std::pin::Pin;
-use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
 use bytes::Bytes;
 use esl_world::{NoEventLoop, TlsIdentity};
 use http_body_util::combinators::BoxBody;
-use http_body_util::{BodyExt, Full, Limited};
+use http_body_util::{BodyExt, Full};
 use hyper::body::Incoming;
 use hyper::header::{CACHE_CONTROL, CONTENT_TYPE, HOST, HeaderValue, X_CONTENT_TYPE_OPTIONS};
-use hyper::http::request::Parts;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper::{Request, Response, StatusCode};
@@ -26,7 +23,7 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use super::lobby::{Lobby, LobbyVisit, notice_absence};
 
 /// Most bytes of the head of a request.
-const HEAD: usize = 16 << 10;
+pub(super) const HEAD: usize = 16 << 10;
 /// Time that a peer has for the head of a request.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 
@@ -106,64 +103,6 @@ async fn converse<F, R>(
     drop(connection.await);
 }
 
-/// Takes bytes as those that come over a connection, and calls `judge` with the head and the body of each
-/// request, which says whether it understands them. Returns how many it has understood.
-pub(super) fn understand(bytes: &[u8], judge: impl Fn(&Parts, &[u8]) -> bool) -> usize {
-    let understood = std::cell::Cell::new(0);
-    let service = service_fn(|request: Request<Incoming>| async {
-        let (head, body) = request.into_parts();
-        let is_own = head.headers.get(HOST).is_some_and(is_own_name);
-        // A body that does not end is none.
-        let body = Limited::new(body, 1 << 20).collect().await.map(|body| body.to_bytes());
-        if body.is_ok_and(|body| judge(&head, &body)) && is_own {
-            understood.set(understood.get() + 1);
-        }
-        Ok::<_, Infallible>(plain(StatusCode::OK, ""))
-    });
-    let connection = http1::Builder::new().max_buf_size(HEAD).serve_connection(Overheard(bytes), service);
-    // All bytes are there, so nothing is waited for; it may want to be asked again all the same.
-    let mut connection = std::pin::pin!(connection);
-    for _ in 0..64 {
-        if connection.as_mut().poll(&mut Context::from_waker(Waker::noop())).is_ready() {
-            break;
-        }
-    }
-    understood.get()
-}
-
-/// Bytes as a connection over which they come, and then no others; what is answered goes nowhere.
-struct Overheard<'a>(&'a [u8]);
-
-impl hyper::rt::Read for Overheard<'_> {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        _: &mut Context<'_>,
-        mut to: hyper::rt::ReadBufCursor<'_>,
-    ) -> Poll<std::io::Result<()>> {
-        if self.0.is_empty() {
-            return Poll::Pending;
-        }
-        let (now, rest) = self.0.split_at(self.0.len().min(to.remaining()));
-        to.put_slice(now);
-        self.0 = rest;
-        Poll::Ready(Ok(()))
-    }
-}
-
-impl hyper::rt::Write for Overheard<'_> {
-    fn poll_write(self: Pin<&mut Self>, _: &mut Context<'_>, bytes: &[u8]) -> Poll<std::io::Result<usize>> {
-        Poll::Ready(Ok(bytes.len()))
-    }
-
-    fn poll_flush(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<std::io::Result<()>> {
-        Poll::Ready(Ok(()))
-    }
-
-    fn poll_shutdown(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<std::io::Result<()>> {
-        Poll::Ready(Ok(()))
-    }
-}
-
 async fn answer<F, R>(
     request: Request<Incoming>,
     is_secured: bool,
@@ -182,7 +121,7 @@ where
 }
 
 /// Returns whether a `Host` header names a server by its address, or as `localhost`.
-fn is_own_name(host: &HeaderValue) -> bool {
+pub(super) fn is_own_name(host: &HeaderValue) -> bool {
     let Ok(host) = host.to_str() else { return false };
     let name = match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,

@@ -32,6 +32,7 @@ mod http;
 mod lobby;
 mod metrics;
 mod monitor;
+#[cfg(any(test, fuzzing))]
 #[doc(hidden)]
 pub mod noise;
 mod refusal;

@@ -11,6 +11,8 @@
 
 pub(super) mod datum;
 mod form;
+#[cfg(any(test, fuzzing))]
+pub(super) mod noise;
 mod outbox;
 mod packet;
 mod request;
@@ -318,31 +320,6 @@ async fn attend(
         stop.abort();
     }
     ended
-}
-
-/// Takes bytes as those that come over a connection: a secret, and requests, of which none is done. Returns
-/// the number of those that were understood.
-pub(super) fn understand(secrets: &Secrets, bytes: &[u8]) -> usize {
-    let mut rest = bytes;
-    let Some(said) = packet::taken(&mut rest, SECRET) else { return 0 };
-    let form = WireForm::parse(&said).ok();
-    let text = form.as_ref().and_then(WireForm::as_text).unwrap_or(said.trim_end());
-    let mut understood = usize::from(secrets.role_of(text.as_bytes()).is_some());
-    while let Some(text) = packet::taken(&mut rest, LARGEST) {
-        let Ok(request) = WireForm::parse(&text) else { continue };
-        assert_eq!(WireForm::parse(&request.to_string()).as_ref(), Ok(&request), "what is written is read");
-        let items = request.items().unwrap_or_default();
-        let form = items.get(1).and_then(WireForm::items).unwrap_or_default();
-        let name = form.first().and_then(WireForm::name).unwrap_or_default();
-        let arguments = form.get(1..).unwrap_or_default();
-        let is_known = OperatorSession::role_for(&name).is_some();
-        understood +=
-            usize::from(is_known && super::slime::step(&name, arguments).is_none_or(|step| step.1.is_ok()));
-        for data in arguments.iter().filter_map(WireForm::as_text).filter_map(|text| codes_of(text).ok()) {
-            drop(datum::form_of(&data));
-        }
-    }
-    understood
 }
 
 /// Takes requests until the connection ends.

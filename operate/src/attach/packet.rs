@@ -3,7 +3,6 @@
 //! Source: the protocol of SLIME's server, SWANK.
 
 use std::io::{self, Error, ErrorKind, Read, Write};
-use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncReadExt};
@@ -55,17 +54,6 @@ async fn read_rest(first: u8, from: &mut (impl AsyncRead + Unpin), most: usize) 
         return Err(ErrorKind::UnexpectedEof.into());
     }
     String::from_utf8(bytes).map_err(|_| ErrorKind::InvalidData.into())
-}
-
-/// Takes a packet of at most `most` bytes off the bytes that have come over a connection, as [`read_async`]
-/// does; `None` if there is none, and there will be no other.
-pub(super) fn taken(bytes: &mut &[u8], most: usize) -> Option<String> {
-    let packet = std::pin::pin!(read_async(bytes, most));
-    match packet.poll(&mut Context::from_waker(Waker::noop())) {
-        Poll::Ready(packet) => packet.ok(),
-        // All bytes are there, so nothing is waited for.
-        Poll::Pending => None,
-    }
 }
 
 /// Reads a packet.

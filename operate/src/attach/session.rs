@@ -183,6 +183,7 @@ impl OperatorSession {
     }
 
     /// Returns the role that a request needs; `None` if there is no such request.
+    #[cfg(any(test, fuzzing))]
     pub(super) fn role_for(name: &str) -> Option<OperatorRole> {
         SessionRequest::named(name)
             .map(SessionRequest::role)

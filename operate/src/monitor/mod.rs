@@ -186,10 +186,11 @@ async fn answer(
     }
 }
 
-/// Takes bytes as those of a connection, and what is in its posts as what is asked for; does nothing of it.
-/// Returns the number of requests that were understood.
+/// Takes bytes as those of a connection, and parses its requests; performs none. Returns the number of requests
+/// that were understood.
+#[cfg(any(test, fuzzing))]
 pub(super) fn understand(secrets: &Secrets, bytes: &[u8]) -> usize {
-    http::understand(bytes, |head, body| match admit(secrets, "http://", head) {
+    crate::noise::http::understand(bytes, |head, body| match admit(secrets, "http://", head) {
         Ok(Admitted::Post { role, is_view }) => parse(role, is_view, body).is_ok(),
         admitted => admitted.is_ok(),
     })

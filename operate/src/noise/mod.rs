@@ -1,7 +1,9 @@
-//! Input from unknown peers, without connections: for tests and fuzzing.
+//! Input from unknown peers, without connections. Only tests and fuzzing compile this module.
 //!
 //! Guarantees: nothing is done; no bytes make this panic, or use more memory than a small multiple of their
 //! number.
+
+pub(crate) mod http;
 
 use super::secrets::Secrets;
 use super::{attach, monitor};
@@ -13,7 +15,7 @@ const SECRETS: &str = "observe aaaaaaaaaaaaaaaa\ncommand bbbbbbbbbbbbbbbb\npatch
 /// how many requests were understood.
 pub fn understand(bytes: &[u8]) -> usize {
     let Ok(secrets) = Secrets::parse(SECRETS) else { return 0 };
-    attach::understand(&secrets, bytes) + monitor::understand(&secrets, bytes)
+    attach::noise::understand(&secrets, bytes) + monitor::understand(&secrets, bytes)
 }
 
 #[cfg(test)]
