@@ -4,6 +4,8 @@
 //! The name of a type means one thing in the whole workspace. Errors have types, files are as long as one
 //! thing takes, comments are as narrow as code, and comments name the thing where they begin.
 
+mod dependencies;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -80,9 +82,7 @@ fn the_map_lists_every_module() {
     }
     let tools: BTreeSet<String> = TOOLS.iter().map(|tool| format!("{tool}/")).collect();
     assert_eq!(names_of_rows(section(&document, "### The tools")), tools);
-    let members = read("Cargo.toml");
-    let members = members.split("members = [").nth(1).and_then(|rest| rest.split(']').next());
-    for member in members.expect("there are members").split('"').skip(1).step_by(2) {
+    for member in dependencies::members() {
         assert!(document.contains(&format!("`{member}/`")), "`{member}/` is not in the map");
     }
 }
@@ -119,12 +119,16 @@ fn the_readme_of_a_crate_lists_its_public_modules() {
 
 #[test]
 fn the_readmes_of_the_libraries_list_their_files() {
-    let order = read("stdlib/load-order");
-    let loaded: BTreeSet<String> =
-        order.lines().filter(|line| !line.starts_with('#')).map(String::from).collect();
     let text = read("stdlib/README.md");
-    let files = names_of_rows(section(&text, "| files | contents |"));
-    assert_eq!(files, loaded, "stdlib/README.md and stdlib/load-order");
+    for (folder, heading) in
+        [("", "| files | contents |"), ("operators/", "| files of `operators/` | contents |")]
+    {
+        let order = read(&format!("stdlib/{folder}load-order"));
+        let loaded: BTreeSet<String> =
+            order.lines().filter(|line| !line.starts_with('#')).map(String::from).collect();
+        let files = names_of_rows(section(&text, heading));
+        assert_eq!(files, loaded, "stdlib/README.md and stdlib/{folder}load-order");
+    }
     let names: BTreeSet<String> =
         modules(&root().join("world/modules")).iter().map(|name| format!(":{name}")).collect();
     assert_eq!(names_of_rows(&read("world/README.md")), names, "world/README.md and world/modules/");
