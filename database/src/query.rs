@@ -163,7 +163,7 @@ pub(crate) struct Query {
     pub(super) tables: Vec<Answers>,
     /// Bytes of them and their answers, approximately.
     pub(super) table_bytes: usize,
-    /// Bytes of computations that have been set aside, approximately.
+    /// Bytes of suspended computations, approximately.
     pub(super) waiting_bytes: usize,
     /// Tables by the hash of their call.
     pub(super) by_call: super::bucket::Buckets,

@@ -5,10 +5,10 @@
 //! is kept in the [`Query`], so it can stop after any amount of work.
 //!
 //! A goal about a predicate with rules looks up the table of the same call. Unless the table is complete, the
-//! rest of the computation is set aside as one of its consumers, and gets each answer once, whenever it is
+//! rest of the computation is suspended as one of its consumers, and gets each answer once, whenever it is
 //! found. So each combination of answers is considered once, and rules with finitely many answers terminate,
 //! in whatever order they are written. Work is done by strata: a negated call is complete before its negation
-//! is evaluated; a negation that reaches an incomplete table is set aside as well. The tables are in
+//! is evaluated; a negation that reaches an incomplete table is suspended as well. The tables are in
 //! `tabling`.
 //!
 //! Source: OLD resolution with tabulation (Tamaki and Sato 1986), with the continuations of SLG; the strata

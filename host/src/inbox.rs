@@ -14,8 +14,8 @@ use std::time::{Duration, Instant};
 
 use esl_bytecode::datum::Datum;
 
-use super::door::Doors;
 use super::question::{Asking, Question};
+use super::sender::Admission;
 use super::survey::Inspections;
 use super::{News, ProcessSignal, Wake};
 
@@ -83,7 +83,7 @@ struct InboxState {
     waiting: AtomicU32,
     /// Inspections, which come beside the contents.
     inspections: Mutex<Inspections>,
-    doors: Doors,
+    admission: Admission,
     asking: Asking,
     /// A bit for each signal of the process that the program handles, by number.
     handled: AtomicU32,
@@ -111,8 +111,8 @@ impl Inbox {
         self.0.inspections.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn doors(&self) -> &Doors {
-        &self.0.doors
+    pub(super) fn admission(&self) -> &Admission {
+        &self.0.admission
     }
 
     pub(super) fn asking(&self) -> &Asking {

@@ -9,7 +9,7 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 
 use super::argument::{ArgumentReader, FromCall};
-use super::door::DoorEntry;
+use super::sender::AdmissionRequest;
 use super::{HostFailure, Inbox, Incoming, SendError};
 
 /// Most signals of one input that are on their way to the machine, whatever its rule is: a driver that is
@@ -48,8 +48,8 @@ impl HostInput {
     /// [`SendError::NoSuchInput`], if the program has removed it, and [`SendError::Ended`].
     pub async fn signal(&self, arguments: Vec<Datum>) -> Result<(), SendError> {
         poll_fn(|context| {
-            let entry = DoorEntry { limit: Some(MOST_SENT), waker: Some(context.waker()) };
-            self.inbox.doors().poll_enter(&self.name, entry)
+            let request = AdmissionRequest { limit: Some(MOST_SENT), waker: Some(context.waker()) };
+            self.inbox.admission().poll_admit(&self.name, request)
         })
         .await?;
         self.put(arguments);
@@ -61,9 +61,9 @@ impl HostInput {
     /// # Errors
     /// [`SendError`].
     pub fn try_signal(&self, arguments: Vec<Datum>) -> Result<(), SendError> {
-        let entry = DoorEntry { limit: Some(MOST_SENT), waker: None };
-        match self.inbox.doors().poll_enter(&self.name, entry) {
-            std::task::Poll::Ready(entered) => entered?,
+        let request = AdmissionRequest { limit: Some(MOST_SENT), waker: None };
+        match self.inbox.admission().poll_admit(&self.name, request) {
+            std::task::Poll::Ready(admitted) => admitted?,
             std::task::Poll::Pending => return Err(SendError::Full(self.name.to_string())),
         }
         self.put(arguments);
@@ -109,7 +109,7 @@ mod tests {
         let inbox = Inbox::new();
         let input = HostInput::new(&inbox, "scan 1");
         assert_eq!(input.try_signal(Vec::new()), Err(SendError::NoSuchInput("scan 1".into())));
-        inbox.open_door("scan 1", Some(1));
+        inbox.open_input("scan 1", Some(1));
         assert_eq!(input.try_signal(Vec::new()), Ok(()));
         assert_eq!(input.try_signal(Vec::new()), Err(SendError::Full("scan 1".into())));
         let woken = Arc::new(Count::default());
@@ -123,14 +123,14 @@ mod tests {
         assert_eq!(inbox.take().len(), 2);
         let mut signal = pin!(input.signal(Vec::new()));
         assert_eq!(signal.as_mut().poll(&mut context), Poll::Pending);
-        inbox.remove_door("scan 1");
+        inbox.remove_input("scan 1");
         assert!(matches!(signal.as_mut().poll(&mut context), Poll::Ready(Err(SendError::NoSuchInput(_)))));
     }
 
     #[test]
     fn signals_on_their_way_are_bounded_whatever_the_rule() {
         let inbox = Inbox::new();
-        inbox.open_door("A", None);
+        inbox.open_input("A", None);
         let input = HostInput::new(&inbox, "A");
         let sent = std::iter::repeat_with(|| input.try_signal(Vec::new())).take_while(Result::is_ok).count();
         assert_eq!(sent, MOST_SENT);

@@ -9,7 +9,7 @@
 //! | `inbox`, `signal` | [`Inbox`]: unrequested events, from any thread; the signals of the process |
 //! | `function`, `argument`, `value` | [`HostRows`]: functions of the host, each declared once, with typed arguments and values |
 //! | `input` | [`HostInput`]: an input that a driver signals, which waits for room |
-//! | `door` | [`Sender`]: signals of inputs, with a limit on the unread ones |
+//! | `sender` | [`Sender`]: signals of inputs, with a limit on the unread ones |
 //! | `operation` | [`HostOperation`]: work of the outside for a task, and its end |
 //! | `question` | [`Question`]: calls, evaluations and commands for a run, and their answers |
 //! | `survey` | [`Inspection`]: reading the state of a run between two turns, without an effect on it |
@@ -35,7 +35,6 @@ mod argument;
 mod asked;
 mod canary;
 mod console;
-mod door;
 mod function;
 mod host;
 mod inbox;
@@ -48,6 +47,7 @@ mod real_output;
 mod record;
 mod replay;
 mod rights;
+mod sender;
 mod shared;
 mod signal;
 mod survey;
@@ -56,7 +56,6 @@ mod value;
 mod virtual_host;
 
 pub use argument::{ArgumentList, ArgumentReader, FromArgument, FromCall, Payload};
-pub use door::{SendError, Sender};
 pub use function::{
     BeginFuture, Completion, DataFunction, Handler, HostFunction, HostModule, HostRow, HostRows, Need,
     OperationFuture, definitions,
@@ -73,6 +72,7 @@ pub use real::{RealHost, Screen, request_of_files};
 pub use record::{NotedRecord, QuestionHash, Record, Recorder, Recording, RecordingHost};
 pub use replay::{Divergence, ReplayHost};
 pub use rights::{Permit, Right, Rights};
+pub use sender::{SendError, Sender};
 pub use signal::ProcessSignal;
 pub use survey::{
     FailureFrame, FailureRow, FrameRow, FrameVariable, InputRow, Inspection, Lateness, LockRow, RelationRow,

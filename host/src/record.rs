@@ -172,7 +172,7 @@ impl Record {
             Record::FileRead(_) => "the contents of a file",
             Record::Exists(_) => "whether there is a file",
             Record::Called(_) => "a call of the host",
-            Record::BrokenOutput(_) => "the status of an output that nobody reads",
+            Record::BrokenOutput(_) => "the status of a closed output",
             Record::Due(_) => "a time that has come",
             Record::Received(_) => "something that came into the inbox",
             Record::Checked(_) => "a check",

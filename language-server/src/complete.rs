@@ -14,7 +14,7 @@ use super::describe::{call_at, markdown, usage};
 use super::document::OpenText;
 use super::library::language;
 use super::project::Project;
-use super::scope::{LocalSort, bindings_around, sort_at};
+use super::scope::{LocalKind, bindings_around, kind_at};
 
 /// Names that are offered at once; the rest comes as more is typed.
 const MAX_ITEMS: usize = 400;
@@ -206,14 +206,14 @@ fn names(project: &Project, found: &mut Candidates<'_>, node: u32) {
     let text = found.text;
     let jump = jump_at(&text.tree, node, found.place.start);
     for binding in bindings_around(&text.tree, node) {
-        let kind = match binding.sort {
-            LocalSort::Variable => CompletionItemKind::VARIABLE,
-            LocalSort::Function => CompletionItemKind::FUNCTION,
-            LocalSort::Block | LocalSort::Tag => CompletionItemKind::REFERENCE,
+        let kind = match binding.kind {
+            LocalKind::Variable => CompletionItemKind::VARIABLE,
+            LocalKind::Function => CompletionItemKind::FUNCTION,
+            LocalKind::Block | LocalKind::Tag => CompletionItemKind::REFERENCE,
         };
         let is_wanted = match jump {
-            Some(sort) => binding.sort == sort,
-            None => matches!(binding.sort, LocalSort::Variable | LocalSort::Function),
+            Some(kind) => binding.kind == kind,
+            None => matches!(binding.kind, LocalKind::Variable | LocalKind::Function),
         };
         if !is_wanted {
             continue;
@@ -222,12 +222,12 @@ fn names(project: &Project, found: &mut Candidates<'_>, node: u32) {
             found.add(&bare_name(name), kind, 0, None);
         }
     }
-    if let Some(sort) = jump {
+    if let Some(kind) = jump {
         // The body of a function is a block of its name.
         let own = definitions(&text.tree).into_iter();
         let start = found.place.start;
         let is_around = |own: &NameDefinition| own.kind == DefinedAs::Function && own.place.contains(&start);
-        for definition in own.filter(|own| sort == LocalSort::Block && is_around(own)) {
+        for definition in own.filter(|own| kind == LocalKind::Block && is_around(own)) {
             found.add(&definition.name, CompletionItemKind::REFERENCE, 1, Some(&definition));
         }
         return;
@@ -262,16 +262,16 @@ fn is_module_name(tree: &SyntaxTree, node: NodeId) -> bool {
         && tree.text(node).starts_with('"')
 }
 
-/// Returns the sort of the place to go to that is being typed, if one is: after `return-from` or `go`.
-fn jump_at(tree: &SyntaxTree, node: NodeId, start: usize) -> Option<LocalSort> {
+/// Returns the kind of the place to go to that is being typed, if one is: after `return-from` or `go`.
+fn jump_at(tree: &SyntaxTree, node: NodeId, start: usize) -> Option<LocalKind> {
     if tree.name(node).is_some() {
-        return Some(sort_at(tree, node)).filter(|sort| matches!(sort, LocalSort::Block | LocalSort::Tag));
+        return Some(kind_at(tree, node)).filter(|kind| matches!(kind, LocalKind::Block | LocalKind::Tag));
     }
     // Nothing has been typed of it yet.
     let mut before = tree.data(node).take_while(|&part| tree.range(part).start < start);
     match (before.next().and_then(|first| tree.name(first)).map(bare_name).as_deref(), before.next()) {
-        (Some("return-from"), None) => Some(LocalSort::Block),
-        (Some("go"), None) => Some(LocalSort::Tag),
+        (Some("return-from"), None) => Some(LocalKind::Block),
+        (Some("go"), None) => Some(LocalKind::Tag),
         _ => None,
     }
 }
@@ -318,7 +318,7 @@ fn in_declaration(tree: &SyntaxTree, list: NodeId, found: &mut Candidates<'_>, n
             // The variables of the form of which the declaration is a part.
             let scope = tree.list_around(outer);
             let bindings = bindings_around(tree, outer);
-            for binding in bindings.iter().filter(|one| one.sort == LocalSort::Variable) {
+            for binding in bindings.iter().filter(|one| one.kind == LocalKind::Variable) {
                 if let Some(name) = tree.name(binding.name).filter(|_| Some(binding.scope) == scope) {
                     found.add(&bare_name(name), CompletionItemKind::VARIABLE, 0, None);
                 }

@@ -9,7 +9,7 @@ use lsp_types::{
 use super::definition::{DefinedAs, NameDefinition};
 use super::document::OpenText;
 use super::project::Project;
-use super::scope::{LocalSort, binding_of};
+use super::scope::{LocalKind, binding_of};
 
 /// Answers what the name at a position is.
 pub(super) fn hover(project: &Project, parameters: &HoverParams) -> Option<Hover> {
@@ -20,11 +20,11 @@ pub(super) fn hover(project: &Project, parameters: &HoverParams) -> Option<Hover
     let value = match binding_of(&text.tree, node) {
         Some(binding) => {
             let line = text.position(text.tree.range(binding.name).start).line + 1;
-            match binding.sort {
-                LocalSort::Variable => format!("`{name}`: local variable, bound on line {line}"),
-                LocalSort::Function => format!("`{name}`: local function, bound on line {line}"),
-                LocalSort::Block => format!("`{name}`: block, which begins on line {line}"),
-                LocalSort::Tag => format!("`{name}`: tag on line {line}"),
+            match binding.kind {
+                LocalKind::Variable => format!("`{name}`: local variable, bound on line {line}"),
+                LocalKind::Function => format!("`{name}`: local function, bound on line {line}"),
+                LocalKind::Block => format!("`{name}`: block, which begins on line {line}"),
+                LocalKind::Tag => format!("`{name}`: tag on line {line}"),
             }
         }
         None => {

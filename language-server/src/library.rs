@@ -43,7 +43,7 @@ impl LanguageNames {
         // The reference is authoritative for descriptions, the sources for places.
         for ReferenceEntry { name, kind, lambda_list, text } in reference::entries() {
             let places = written.find_all(&name);
-            let same = places.iter().find(|place| sort_of(place.definition.kind) == sort_of(kind));
+            let same = places.iter().find(|place| namespace_of(place.definition.kind) == namespace_of(kind));
             let mut told = written_in_rust(name, kind, lambda_list, text, true);
             if let Some(place) = same.or(places.first()) {
                 told.source = place.source;
@@ -116,8 +116,8 @@ impl LanguageNames {
     }
 }
 
-/// Returns a number for the sort of a definition: names of different sorts do not get into each other's way.
-fn sort_of(kind: DefinedAs) -> u8 {
+/// Returns a number for the namespace of a definition: names in different namespaces do not conflict.
+fn namespace_of(kind: DefinedAs) -> u8 {
     match kind {
         DefinedAs::Function | DefinedAs::Macro | DefinedAs::Operator | DefinedAs::Slot => 0,
         DefinedAs::Variable | DefinedAs::Constant => 1,

@@ -24,7 +24,7 @@ pub(super) fn entries() -> Vec<ReferenceEntry> {
     let mut found = Vec::new();
     for line in CHAPTER.lines() {
         if let Some(heading) = line.strip_prefix("## ") {
-            kind = match heading.split_once(": ").map_or("", |(_, sort)| sort) {
+            kind = match heading.split_once(": ").map_or("", |(_, kind)| kind) {
                 "special operators" => DefinedAs::Operator,
                 "macros" => DefinedAs::Macro,
                 "functions" => DefinedAs::Function,

@@ -19,7 +19,7 @@ use super::family::{RenamedName, family, is_made, is_slot};
 use super::library::language;
 use super::navigate::{NameAt, name_at, texts_of, uses_in, uses_of};
 use super::project::Project;
-use super::scope::{LocalBinding, LocalSort, binding_of, bindings_around, sort_at};
+use super::scope::{LocalBinding, LocalKind, binding_of, bindings_around, kind_at};
 
 /// Answers whether the name at a position can be renamed.
 pub(super) fn prepare_rename(
@@ -194,7 +194,7 @@ fn rename_local(project: &Project, found: &NameAt<'_>, new: &str) -> Result<Work
     let uses = uses_in(found.text, found);
     // Another way to write the same name changes nothing.
     if wanted != found.name {
-        if found.binding.is_some_and(|binding| binding.sort == LocalSort::Function) {
+        if found.binding.is_some_and(|binding| binding.kind == LocalKind::Function) {
             refuse_defined(project, found.text, found.binding, &found.name, &wanted)?;
         }
         refuse_capture(found.text, &uses, found.binding, &wanted)?;
@@ -290,7 +290,7 @@ fn key_parameter(tree: &SyntaxTree, name: NodeId) -> Option<WrittenKey> {
         .then_some(WrittenKey::WithDefault)
 }
 
-/// Refuses the name of another definition of the same sort, and for functions those of the language.
+/// Refuses the name of another definition in the same namespace, and for functions those of the language.
 fn refuse_defined(
     project: &Project,
     text: &OpenText,
@@ -298,7 +298,7 @@ fn refuse_defined(
     old: &str,
     new: &str,
 ) -> Result<(), RenameRefusal> {
-    let sort = |kind: DefinedAs| match kind {
+    let namespace = |kind: DefinedAs| match kind {
         DefinedAs::Function | DefinedAs::Macro | DefinedAs::Operator | DefinedAs::Slot => 0,
         DefinedAs::Variable | DefinedAs::Constant => 1,
         DefinedAs::Type => 2,
@@ -309,15 +309,16 @@ fn refuse_defined(
     };
     let own: Vec<u8> = match binding {
         Some(_) => vec![0],
-        None => project.find(text, old).iter().map(|(name, _)| sort(name.kind)).collect(),
+        None => project.find(text, old).iter().map(|(name, _)| namespace(name.kind)).collect(),
     };
     if let Some(name) =
-        language().find(new).filter(|name| name.is_public && own.contains(&sort(name.definition.kind)))
+        language().find(new).filter(|name| name.is_public && own.contains(&namespace(name.definition.kind)))
     {
         return Err(RenameRefusal::OfLanguage(name.definition.name.to_string()));
     }
-    let is_same_sort = |kind| binding.is_none() && (own.contains(&sort(kind)) || kind == DefinedAs::Other);
-    match project.find(text, new).into_iter().find(|(name, _)| is_same_sort(name.kind)) {
+    let is_same_namespace =
+        |kind| binding.is_none() && (own.contains(&namespace(kind)) || kind == DefinedAs::Other);
+    match project.find(text, new).into_iter().find(|(name, _)| is_same_namespace(name.kind)) {
         Some((_, place)) => {
             let line = place.map(|place| place.range.start.line + 1);
             Err(RenameRefusal::Defined(new.into(), line))
@@ -337,11 +338,11 @@ fn refuse_capture(
     let line = |node: NodeId| text.position(tree.range(node).start).line + 1;
     let is_new = |name: NodeId| tree.name(name).map(bare_name).is_some_and(|name| name == new);
     for &node in uses {
-        let sort = binding.map_or_else(|| sort_at(tree, node), |binding| binding.sort);
+        let kind = binding.map_or_else(|| kind_at(tree, node), |binding| binding.kind);
         let scope = binding.map(|binding| tree.range(binding.scope));
         let captures = |other: &LocalBinding| {
             let is_inside = scope.as_ref().is_none_or(|scope| scope.start <= tree.range(other.scope).start);
-            is_inside && other.sort == sort && is_new(other.name)
+            is_inside && other.kind == kind && is_new(other.name)
         };
         if let Some(other) = bindings_around(tree, node).into_iter().find(captures) {
             return Err(RenameRefusal::Bound(new.into(), line(other.name)));
@@ -352,9 +353,9 @@ fn refuse_capture(
     for node in (tree.first_at(scope.start)..tree.first_at(scope.end)).filter(|&node| is_new(node)) {
         let is_quoted =
             tree.parent(node).is_some_and(|mark| tree.kind(mark) == SyntaxKind::Mark(Token::Quote));
-        let is_same_sort = sort_at(tree, node) == binding.sort;
+        let is_same_kind = kind_at(tree, node) == binding.kind;
         let is_free = binding_of(tree, node).is_none_or(|other| tree.range(other.scope).start < scope.start);
-        if !is_quoted && is_same_sort && is_free {
+        if !is_quoted && is_same_kind && is_free {
             return Err(RenameRefusal::Captured(new.into(), line(node)));
         }
     }

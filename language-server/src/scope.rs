@@ -49,7 +49,7 @@ const DEFINING_NO_FUNCTION: &[&str] = &[
 
 /// The kind of a local name: each kind has a namespace of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum LocalSort {
+pub(super) enum LocalKind {
     Variable,
     Function,
     /// A block that `return-from` leaves.
@@ -65,7 +65,7 @@ pub(super) struct LocalBinding {
     pub(super) name: NodeId,
     /// The form in which the binding holds.
     pub(super) scope: NodeId,
-    pub(super) sort: LocalSort,
+    pub(super) kind: LocalKind,
 }
 
 /// Returns the bindings around a node, the innermost first.
@@ -89,32 +89,32 @@ pub(super) fn binding_of(tree: &SyntaxTree, node: NodeId) -> Option<LocalBinding
     if let Some(own) = bindings.iter().find(|binding| binding.name == node) {
         return Some(*own);
     }
-    let sort = sort_at(tree, node);
+    let kind = kind_at(tree, node);
     let same = |binding: &&LocalBinding| tree.name(binding.name).map(bare_name).as_ref() == Some(&name);
-    let mut known = bindings.iter().filter(same).filter(|binding| is_seen(tree, binding, sort, node));
+    let mut known = bindings.iter().filter(same).filter(|binding| is_seen(tree, binding, kind, node));
     known.find(|binding| template_level(tree, binding.name) == Some(level)).copied()
 }
 
-/// Whether a binding is one of this sort for a name inside its form. The body of a local function is a block
+/// Whether a binding is one of this kind for a name inside its form. The body of a local function is a block
 /// of the function's name.
-pub(super) fn is_seen(tree: &SyntaxTree, binding: &LocalBinding, sort: LocalSort, node: NodeId) -> bool {
+pub(super) fn is_seen(tree: &SyntaxTree, binding: &LocalBinding, kind: LocalKind, node: NodeId) -> bool {
     let is_block = || {
         let definition = tree.parent(binding.name).map(|definition| tree.range(definition));
-        binding.sort == LocalSort::Function
+        binding.kind == LocalKind::Function
             && definition.is_some_and(|place| place.contains(&tree.range(node).start))
     };
-    binding.sort == sort || sort == LocalSort::Block && is_block()
+    binding.kind == kind || kind == LocalKind::Block && is_block()
 }
 
-/// Returns the sort of the name that stands here.
-pub(super) fn sort_at(tree: &SyntaxTree, node: NodeId) -> LocalSort {
+/// Returns the kind of the name that stands here.
+pub(super) fn kind_at(tree: &SyntaxTree, node: NodeId) -> LocalKind {
     let list = tree.parent(node).filter(|&list| tree.kind(list) == SyntaxKind::List);
     let jump = list.filter(|&list| tree.data(list).nth(1) == Some(node)).and_then(|list| tree.operator(list));
     match jump.as_deref() {
-        Some("return-from") => LocalSort::Block,
-        Some("go") => LocalSort::Tag,
-        _ if is_operator(tree, node) => LocalSort::Function,
-        _ => LocalSort::Variable,
+        Some("return-from") => LocalKind::Block,
+        Some("go") => LocalKind::Tag,
+        _ if is_operator(tree, node) => LocalKind::Function,
+        _ => LocalKind::Variable,
     }
 }
 
@@ -217,7 +217,7 @@ pub(super) fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBin
     let Some(operator) = tree.operator(list) else { return bound_by_clause(tree, list, found) };
     blocks_and_tags(tree, list, &operator, found);
     let mut variable =
-        |name: NodeId| found.push(LocalBinding { name, scope: list, sort: LocalSort::Variable });
+        |name: NodeId| found.push(LocalBinding { name, scope: list, kind: LocalKind::Variable });
     match &*operator {
         "let" | "let*" | "do" | "do*" | "prog" | "prog*" | "symbol-macrolet" | "with-slots"
         | "with-accessors" => {
@@ -244,7 +244,7 @@ pub(super) fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBin
             let functions = argument(1).into_iter().flat_map(|functions| tree.data(functions));
             let names = functions.filter_map(|function| tree.data(function).next());
             let names = names.filter(|&name| tree.name(name).is_some());
-            found.extend(names.map(|name| LocalBinding { name, scope: list, sort: LocalSort::Function }));
+            found.extend(names.map(|name| LocalBinding { name, scope: list, kind: LocalKind::Function }));
         }
         "task-net" | "or-parallel" | "try-all" | "pursue" | "try-in-order" | "supervise" => {
             let clauses = tree.data(list).skip(1).filter(|&clause| tree.kind(clause) == SyntaxKind::List);
@@ -288,7 +288,7 @@ fn blocks_and_tags(tree: &SyntaxTree, list: NodeId, operator: &str, found: &mut 
     found.extend(block.filter(is_name).map(|name| LocalBinding {
         name,
         scope: list,
-        sort: LocalSort::Block,
+        kind: LocalKind::Block,
     }));
     let heads = match operator {
         "tagbody" => 1,
@@ -297,13 +297,13 @@ fn blocks_and_tags(tree: &SyntaxTree, list: NodeId, operator: &str, found: &mut 
         _ => return,
     };
     let tags = tree.data(list).skip(heads).filter(is_name);
-    found.extend(tags.map(|name| LocalBinding { name, scope: list, sort: LocalSort::Tag }));
+    found.extend(tags.map(|name| LocalBinding { name, scope: list, kind: LocalKind::Tag }));
 }
 
 /// Adds what a list binds by its place in another form: a local function, a clause.
 fn bound_by_clause(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
     let mut variable =
-        |name: NodeId| found.push(LocalBinding { name, scope: list, sort: LocalSort::Variable });
+        |name: NodeId| found.push(LocalBinding { name, scope: list, kind: LocalKind::Variable });
     let Some(parent) = tree.parent(list) else { return };
     if matches!(tree.operator(parent).as_deref(), Some("handler-case" | "restart-case"))
         && tree.data(parent).nth(1) != Some(list)

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use esl_syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
 
-use super::scope::{LocalBinding, bound_by, is_seen, sort_at, template_level};
+use super::scope::{LocalBinding, bound_by, is_seen, kind_at, template_level};
 
 /// Stands for no list.
 const NONE: NodeId = NodeId::MAX;
@@ -57,10 +57,10 @@ impl<'a> NameBindings<'a> {
         if let Some(own) = self.own.get(&node) {
             return Some(*own);
         }
-        let sort = sort_at(self.tree, node);
+        let kind = kind_at(self.tree, node);
         while list != NONE {
             let fits = |(binding, at): &&(LocalBinding, Option<i32>)| {
-                *at == Some(level) && is_seen(self.tree, binding, sort, node)
+                *at == Some(level) && is_seen(self.tree, binding, kind, node)
             };
             if let Some((binding, _)) =
                 self.bindings.get(&list).and_then(|bindings| bindings.iter().find(fits))

@@ -55,7 +55,7 @@ pub type NativeStore = unsafe extern "C" fn(*mut NativeContext, *mut u64, u64);
 /// at no frame.
 pub type NativeValueOf = unsafe extern "C" fn(*mut NativeContext, u64) -> u64;
 
-/// Function of the machine that sets a symbol that was bound and is no constant. It looks at no frame.
+/// Function of the machine that sets a symbol that was bound and is no constant. It reads no frame.
 pub type NativeSetValueOf = unsafe extern "C" fn(*mut NativeContext, u64, u64);
 
 /// Function of the machine that makes a pair, or returns 0 if that takes more than a hole of the heap. It
@@ -64,7 +64,7 @@ pub type NativeCons = unsafe extern "C" fn(*mut NativeContext, u64, u64) -> u64;
 
 /// Function of the machine that does what the builtin of an instruction does in a hash table: with a key, the
 /// table and what else the builtin is given; without effect, and with the word of `Value::UNBOUND`, if that
-/// takes more. It looks at no frame.
+/// takes more. It reads no frame.
 pub type NativeLookup = unsafe extern "C" fn(*mut NativeContext, u64, u64, u64, u64) -> u64;
 
 /// Machine code of a function: the frame, and the place of entry: 0 for the first instruction, and the
@@ -90,13 +90,13 @@ pub struct NativeContext {
     pub outer: u64,
     /// Value that a builtin called in place of the function has returned, or that `only_value` delivers.
     pub value: u64,
-    /// Registers, from `outer` on, whose doubles are put aside: see N3. None while machine code runs.
-    pub put_aside: [u64; 4],
+    /// Registers, from `outer` on, whose doubles a side exit has saved: see N3. None while machine code runs.
+    pub unspilled: [u64; 4],
     /// The bits of each of them, or [`IN_PLACE`].
     pub doubles: [MaybeUninit<u64>; 256],
     /// The machine.
     pub machine: *mut c_void,
-    /// Does an instruction whose fast way does not apply.
+    /// Does an instruction whose fast path does not apply.
     pub step: NativeHelper,
     /// Calls the builtin of a `call-builtin`.
     pub call_builtin: NativeHelper,

@@ -407,7 +407,7 @@ impl Translator<'_, '_> {
         // the registers of the processor.
         let is_guess = self.kinds.tells_doubles() && x.1 != Known::Double && y.1 != Known::Double;
         let slow = if is_guess { self.wrong() } else { self.cold_block() };
-        // Nothing takes a tick before a way on which the machine code is left.
+        // Nothing takes a tick before a side exit.
         let is_loop = step.instr.opcode().is_loop();
         if is_loop && !is_guess {
             self.tick();

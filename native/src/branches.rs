@@ -94,7 +94,7 @@ impl Translator<'_, '_> {
 
     pub(crate) fn loop_count(&mut self, counter: u8, limit: u8, by: i32, step: &FlowStep) {
         if self.known[usize::from(counter)] == Known::Double {
-            self.put_back();
+            self.spill();
         }
         let (x, y) = (self.operand(counter), self.operand(limit));
         if x.1 == Known::Fixnum {

@@ -110,20 +110,20 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn call_global(&mut self, window: u8, count: u8, want: Want, symbol: u32, next: usize) {
-        self.put_back_for_call(window);
+        self.spill_for_call(window);
         let function = self.global(symbol);
         self.call((window, count, want), function, next);
     }
 
     pub(crate) fn call_given(&mut self, window: u8, count: u8, want: Want, next: usize) {
-        self.put_back_for_call(window);
+        self.spill_for_call(window);
         let (function, exit) = (self.get(window), self.exit());
         self.require_kind(function, Kind::Function, exit);
         self.call((window, count, want), function, next);
     }
 
     pub(crate) fn call_self(&mut self, window: u8, want: Want, next: usize) {
-        self.put_back_for_call(window);
+        self.spill_for_call(window);
         let (function, frame) = (self.running(), self.frame_in(window));
         let registers = self.word(self.source.function.registers as u64);
         self.require_room(frame, registers);
@@ -179,7 +179,7 @@ impl Translator<'_, '_> {
         self.store(return_to, base, place + WORD);
         let mut link = RegisterBits::NONE;
         link.insert_range(usize::from(window), 2);
-        self.kept_back = self.kept_back.without(link);
+        self.unspilled = self.unspilled.without(link);
     }
 
     /// Calls machine code in a frame that has been made, directly if it is that of the function itself, and
@@ -237,13 +237,13 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn tail_call_global(&mut self, window: u8, count: u8, symbol: u32) {
-        self.put_back();
+        self.spill();
         let function = self.global(symbol);
         self.tail_call(window, count, function);
     }
 
     pub(crate) fn tail_call_given(&mut self, window: u8, count: u8) {
-        self.put_back();
+        self.spill();
         let (function, exit) = (self.get(window), self.exit());
         self.require_kind(function, Kind::Function, exit);
         self.tail_call(window, count, function);
@@ -296,7 +296,7 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn call_builtin(&mut self, window: u8, want: Want) {
-        self.put_back();
+        self.spill();
         self.tick();
         let outcome = self.call_helper(offset_of!(NativeContext, call_builtin));
         let signal = self.signal();
@@ -316,7 +316,7 @@ impl Translator<'_, '_> {
     /// Calls a builtin in place of the running function, and goes on with its value in the context. Returns
     /// the block in which it has left others in the value list.
     pub(crate) fn builtin_in_place(&mut self) -> Block {
-        self.put_back();
+        self.spill();
         self.tick();
         let outcome = self.call_helper(offset_of!(NativeContext, tail_builtin));
         let (signal, one, more) = (self.signal(), self.block(), self.cold_block());
@@ -337,7 +337,7 @@ impl Translator<'_, '_> {
 
     /// Returns the value list.
     pub(crate) fn return_values(&mut self) {
-        self.put_back();
+        self.spill();
         let base = self.base;
         self.store_context(base, offset_of!(NativeContext, base));
         self.reply(RETURN_VALUES);

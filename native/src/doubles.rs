@@ -29,8 +29,8 @@ const TESTING_BIAS: u64 = Value::DOUBLE_BIAS + (1 << 61);
 pub(crate) struct DoubleBatch {
     /// Word of the first operation.
     at: usize,
-    /// RegisterBits that were kept back there.
-    kept_back: RegisterBits,
+    /// Registers that were unspilled there.
+    unspilled: RegisterBits,
     /// Those that have been overwritten since.
     saved: Vec<(usize, Ssa)>,
     /// The results, and whether they may be zeros.
@@ -40,18 +40,18 @@ pub(crate) struct DoubleBatch {
     /// Words that get to their places when the results have been tested.
     unwritten: Vec<(u8, Ssa)>,
     /// Blocks that leave at the first operation, with their statuses.
-    ways_out: Vec<(u64, Block)>,
+    side_exits: Vec<(u64, Block)>,
 }
 
 /// Work to be done where control goes to another instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum EdgeWork {
-    /// The register is not kept back: it gets the mark.
+    /// The register is not unspilled: it gets the mark.
     Mark(usize),
-    /// The register is spilled to its place, and is a word from there on.
-    PutBack(usize),
-    /// The word is taken from its place.
-    Take(usize),
+    /// The double is spilled to its place, and the register is a word from there on.
+    Spill(usize),
+    /// The word is loaded from its place.
+    Reload(usize),
 }
 
 impl Translator<'_, '_> {
@@ -66,15 +66,15 @@ impl Translator<'_, '_> {
         let bias = self.b.func.dfg.constants.insert(bias.as_slice().into());
         let bias = self.b.ins().vconst(types::I64X2, bias);
         let biased = self.b.ins().iadd(vector, bias);
-        let kept_back = self.kept_back;
+        let unspilled = self.unspilled;
         let batch = self.batch.get_or_insert(DoubleBatch {
             at: self.at,
-            kept_back,
+            unspilled,
             saved: Vec::new(),
             results: Vec::new(),
             common: None,
             unwritten: Vec::new(),
-            ways_out: Vec::new(),
+            side_exits: Vec::new(),
         });
         batch.results.push((double, may_be_zero));
         batch.common = Some(match batch.common {
@@ -144,7 +144,7 @@ impl Translator<'_, '_> {
             });
         }
         if let Some(all) = all {
-            let out = self.way_out_of(&mut batch, GUESSED_WRONG);
+            let out = self.side_exit_of(&mut batch, GUESSED_WRONG);
             self.require(all, out);
         }
         match wanted {
@@ -155,7 +155,7 @@ impl Translator<'_, '_> {
             None => self.jump(next),
         }
 
-        for (status, out) in std::mem::take(&mut batch.ways_out) {
+        for (status, out) in std::mem::take(&mut batch.side_exits) {
             self.go_to(out);
             self.leave_batch(&batch, status);
         }
@@ -168,32 +168,32 @@ impl Translator<'_, '_> {
 
     /// Leaves at the first operation of a batch, with the registers as they were there.
     fn leave_batch(&mut self, batch: &DoubleBatch, status: u64) {
-        for register in batch.kept_back.iter() {
+        for register in batch.unspilled.iter() {
             let saved = batch.saved.iter().find(|(saved, _)| *saved == register);
             let double = match saved {
                 Some(&(_, double)) => double,
                 None => self.get_double(register as u8),
             };
-            self.put_aside(register, double);
+            self.save_double(register, double);
         }
-        self.name_put_aside(batch.kept_back);
+        self.name_saved(batch.unspilled);
         self.leave_at(batch.at, status);
     }
 
-    fn way_out_of(&mut self, batch: &mut DoubleBatch, status: u64) -> Block {
-        if let Some(&(_, block)) = batch.ways_out.iter().find(|&&(of, _)| of == status) {
+    fn side_exit_of(&mut self, batch: &mut DoubleBatch, status: u64) -> Block {
+        if let Some(&(_, block)) = batch.side_exits.iter().find(|&&(of, _)| of == status) {
             return block;
         }
         let block = self.cold_block();
-        batch.ways_out.push((status, block));
+        batch.side_exits.push((status, block));
         block
     }
 
     /// Returns the block that leaves at the instruction that is translated, or at the first one of the batch.
     /// Both read only.
     pub(crate) fn exit_of_batch(&mut self, status: u64) -> Block {
-        let Some(mut batch) = self.batch.take() else { return self.way_out(self.at, status) };
-        let block = self.way_out_of(&mut batch, status);
+        let Some(mut batch) = self.batch.take() else { return self.side_exit(self.at, status) };
+        let block = self.side_exit_of(&mut batch, status);
         self.batch = Some(batch);
         block
     }
@@ -220,7 +220,7 @@ impl Translator<'_, '_> {
     /// Notes what a register holds that is about to be overwritten, if the batch may have to put it back.
     pub(crate) fn save_for_batch(&mut self, register: usize) {
         let is_needed = self.batch.as_ref().is_some_and(|batch| {
-            batch.kept_back.contains(register) && batch.saved.iter().all(|(saved, _)| *saved != register)
+            batch.unspilled.contains(register) && batch.saved.iter().all(|(saved, _)| *saved != register)
         });
         if is_needed {
             let double = self.get_double(register as u8);
@@ -283,7 +283,7 @@ impl Translator<'_, '_> {
         self.encode(double)
     }
 
-    /// Makes the word of a double in a register that is needed on the fast way.
+    /// Makes the word of a double in a register that is needed on the fast path.
     pub(crate) fn make_word(&mut self, register: usize) {
         if self.known[register] != Known::Double || self.words[register].is_some() {
             return;
@@ -340,12 +340,12 @@ impl Translator<'_, '_> {
         self.b.ins().bitcast(types::F64, MemFlagsData::new(), bits)
     }
 
-    // Registers that are not spilled yet.
+    // Unspilled registers.
 
-    /// Returns the registers that are kept back here: doubles, and such as may be.
-    pub(crate) fn kept_back(&self) -> (RegisterBits, RegisterBits) {
+    /// Returns the unspilled registers: doubles, and those that are spent and may be doubles.
+    pub(crate) fn unspilled_by_kind(&self) -> (RegisterBits, RegisterBits) {
         let (mut doubles, mut spent) = (RegisterBits::NONE, RegisterBits::NONE);
-        for register in self.kept_back.iter() {
+        for register in self.unspilled.iter() {
             match self.known[register] {
                 Known::Double => doubles.insert(register),
                 known => {
@@ -357,28 +357,28 @@ impl Translator<'_, '_> {
         (doubles, spent)
     }
 
-    /// Puts aside what is kept back, on the way that control takes here only. The machine writes it.
-    pub(crate) fn put_all_aside(&mut self, kept_back: RegisterBits) {
-        for register in kept_back.iter() {
+    /// Saves unspilled doubles in the context, on a path that leaves machine code. The machine spills them.
+    pub(crate) fn save_unspilled(&mut self, unspilled: RegisterBits) {
+        for register in unspilled.iter() {
             let double = self.get_double(register as u8);
-            self.put_aside(register, double);
+            self.save_double(register, double);
         }
-        self.name_put_aside(kept_back);
+        self.name_saved(unspilled);
     }
 
-    fn put_aside(&mut self, register: usize, double: Ssa) {
+    fn save_double(&mut self, register: usize, double: Ssa) {
         self.store_context(double, offset_of!(NativeContext, doubles) + register * size_of::<u64>());
     }
 
-    /// Tells the machine what has been put aside.
-    fn name_put_aside(&mut self, kept_back: RegisterBits) {
-        if kept_back != RegisterBits::NONE {
+    /// Names to the machine the registers whose doubles have been saved.
+    fn name_saved(&mut self, unspilled: RegisterBits) {
+        if unspilled != RegisterBits::NONE {
             let outer = self.base;
             self.store_context(outer, offset_of!(NativeContext, outer));
         }
-        for (index, word) in kept_back.words().into_iter().enumerate().filter(|&(_, word)| word != 0) {
+        for (index, word) in unspilled.words().into_iter().enumerate().filter(|&(_, word)| word != 0) {
             let word = self.word(word);
-            self.store_context(word, offset_of!(NativeContext, put_aside) + index * size_of::<u64>());
+            self.store_context(word, offset_of!(NativeContext, unspilled) + index * size_of::<u64>());
         }
     }
 
@@ -399,69 +399,69 @@ impl Translator<'_, '_> {
         self.store(word, base, place);
     }
 
-    /// Puts back all that is kept back: what comes next looks at the stack.
-    pub(crate) fn put_back(&mut self) {
-        self.put_back_but(RegisterBits::NONE);
+    /// Spills all registers: the next instruction reads the stack.
+    pub(crate) fn spill(&mut self) {
+        self.spill_except(RegisterBits::NONE);
     }
 
-    /// Puts back what is kept back, but for the places of the link that a call is going to write.
-    pub(crate) fn put_back_for_call(&mut self, window: u8) {
+    /// Spills all registers except the places of the link, which a call is going to write.
+    pub(crate) fn spill_for_call(&mut self, window: u8) {
         let mut link = RegisterBits::NONE;
         link.insert_range(usize::from(window), 2);
-        self.put_back_but(link);
+        self.spill_except(link);
     }
 
-    fn put_back_but(&mut self, others: RegisterBits) {
+    fn spill_except(&mut self, others: RegisterBits) {
         self.close_batch();
-        let kept_back = self.kept_back;
-        self.kept_back = kept_back.without(others);
-        let (doubles, spent) = self.kept_back();
+        let unspilled = self.unspilled;
+        self.unspilled = unspilled.without(others);
+        let (doubles, spent) = self.unspilled_by_kind();
         for register in doubles.iter() {
             self.make_word(register);
             let (word, base) = (self.word_of_double(register), self.base);
             self.store(word, base, register as i32 * WORD);
         }
         self.write_all_spent(spent);
-        self.kept_back = kept_back.without(self.kept_back);
+        self.unspilled = unspilled.without(self.unspilled);
     }
 
     /// Writes words that hold no address to the places of unspilled doubles that will not be read, for some
     /// of the registers.
     pub(crate) fn clear_places(&mut self, registers: RegisterBits) {
-        let (doubles, spent) = self.kept_back();
+        let (doubles, spent) = self.unspilled_by_kind();
         let (zero, base) = (self.constant_value(Value::small(0)), self.base);
         for register in doubles.within(registers).iter() {
             self.store(zero, base, register as i32 * WORD);
         }
         self.write_all_spent(spent.within(registers));
-        self.kept_back = self.kept_back.without(registers);
+        self.unspilled = self.unspilled.without(registers);
     }
 
-    // Ways from one instruction to another.
+    // Edges from one instruction to another.
 
-    /// Returns what has to be done on the way from here to the instruction at a word.
+    /// Returns the work of the edge from here to the instruction at a word.
     pub(crate) fn edge_works(&self, to: usize) -> Vec<EdgeWork> {
-        let kept_back_there = self.kinds.kept_back(to);
+        let unspilled_there = self.kinds.unspilled(to);
         let mut works = Vec::new();
         for (register, &said) in self.kinds.before(to).iter().enumerate() {
-            let (known, is_kept_back) = (self.known[register], self.kept_back.contains(register));
+            let (known, is_unspilled) = (self.known[register], self.unspilled.contains(register));
             match (said, known) {
                 (Known::Double | Known::Spent, Known::Double) | (Known::Spent, Known::Spent) => {
                     debug_assert!(
-                        !is_kept_back || kept_back_there.contains(register),
+                        !is_unspilled || unspilled_there.contains(register),
                         "{register} from {} to {to}",
                         self.at
                     );
                 }
                 (Known::Spent, _) => {
-                    if kept_back_there.contains(register) {
+                    if unspilled_there.contains(register) {
                         works.push(EdgeWork::Mark(register));
                     }
                 }
-                (Known::Nothing, Known::Double) if is_kept_back => works.push(EdgeWork::PutBack(register)),
-                (Known::Nothing, Known::Double) => works.push(EdgeWork::Take(register)),
+                (Known::Nothing, Known::Double) if is_unspilled => works.push(EdgeWork::Spill(register)),
+                (Known::Nothing, Known::Double) => works.push(EdgeWork::Reload(register)),
                 (Known::Nothing, known) => {
-                    debug_assert!(!is_kept_back, "{register}, {known:?}, from {} to {to}", self.at);
+                    debug_assert!(!is_unspilled, "{register}, {known:?}, from {} to {to}", self.at);
                 }
                 _ => debug_assert_eq!(said, known, "{register} from {} to {to}", self.at),
             }
@@ -477,13 +477,13 @@ impl Translator<'_, '_> {
                     let mark = self.b.ins().f64const(f64::from_bits(IN_PLACE));
                     self.b.def_var(self.doubles[register], mark);
                 }
-                EdgeWork::PutBack(register) => {
+                EdgeWork::Spill(register) => {
                     let double = self.get_double(register as u8);
                     let word = self.encode(double);
                     self.store(word, base, register as i32 * WORD);
                     self.b.def_var(self.variables[register], word);
                 }
-                EdgeWork::Take(register) => {
+                EdgeWork::Reload(register) => {
                     let word = self.load(base, register as i32 * WORD);
                     self.b.def_var(self.variables[register], word);
                 }

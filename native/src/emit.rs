@@ -1,4 +1,4 @@
-//! The pieces that translations are made of: registers, tests of tags, slow ways, exits.
+//! The pieces that translations are made of: registers, tests of tags, slow paths, exits.
 
 use std::mem::offset_of;
 
@@ -11,7 +11,7 @@ use esl_heap::value::{TAG_CONS, TAG_MASK, TAG_OBJECT};
 
 use crate::abi::{AGAIN, GUESSED_WRONG, NativeContext, SIGNAL, STEP_SIGNAL};
 use crate::kinds::Known;
-use crate::places::WayOut;
+use crate::places::SideExit;
 use crate::translate::Translator;
 
 /// Bytes of a value.
@@ -104,7 +104,7 @@ impl Translator<'_, '_> {
     /// something else.
     pub(crate) fn check_guess(&mut self, register: u8) {
         if self.guess == Some(register) {
-            let (value, wrong) = (self.get(register), self.way_out(self.next, GUESSED_WRONG));
+            let (value, wrong) = (self.get(register), self.side_exit(self.next, GUESSED_WRONG));
             let double = self.double_of(value, wrong);
             self.note_double(register, double);
             self.words[usize::from(register)] = Some(value);
@@ -114,7 +114,7 @@ impl Translator<'_, '_> {
     /// Writes a register, and keeps the double back: its place in the stack is not written.
     pub(crate) fn set_double(&mut self, register: u8, double: Ssa) {
         self.note_double(register, double);
-        self.kept_back.insert(usize::from(register));
+        self.unspilled.insert(usize::from(register));
     }
 
     /// As [`Translator::set_double`], for a double of which the word is at hand.
@@ -128,7 +128,7 @@ impl Translator<'_, '_> {
         self.write_with_batch(register, None);
         let (register, variable) = (usize::from(register), self.doubles[usize::from(register)]);
         self.save_for_batch(register);
-        self.kept_back.remove(register);
+        self.unspilled.remove(register);
         self.words[register] = None;
         self.known[register] = Known::Double;
         self.b.def_var(variable, double);
@@ -145,7 +145,7 @@ impl Translator<'_, '_> {
         let variable = self.variables[usize::from(register)];
         self.b.def_var(variable, value);
         self.known[usize::from(register)] = known;
-        self.kept_back.remove(usize::from(register));
+        self.unspilled.remove(usize::from(register));
         self.words[usize::from(register)] = None;
     }
 
@@ -318,7 +318,7 @@ impl Translator<'_, '_> {
         self.store(word, address, offset);
     }
 
-    // Slow ways and exits.
+    // Slow paths and exits.
 
     /// Returns the address of a word of the bytecode.
     pub(crate) fn pc(&mut self, at: usize) -> Ssa {
@@ -340,7 +340,7 @@ impl Translator<'_, '_> {
     /// Unspilled registers are saved first, on this path only.
     pub(crate) fn call_helper(&mut self, helper: usize) -> Ssa {
         debug_assert!(self.batch.is_none(), "{}", self.at);
-        self.put_all_aside(self.kept_back);
+        self.save_unspilled(self.unspilled);
         let (context, base, pc) = (self.context, self.base_at(self.at), self.pc(self.at));
         let helper = self.load_context(helper);
         let call = self.b.ins().call_indirect(self.helper_signature, helper, &[context, pc, base]);
@@ -368,7 +368,7 @@ impl Translator<'_, '_> {
         self.branch(outcome, jump, next);
     }
 
-    /// Ends the fast ways of an instruction with a result, which `done` takes; `slow` leads to the machine.
+    /// Ends the fast paths of an instruction with a result, which `done` takes; `slow` leads to the machine.
     /// If it is to be a fixnum, and what the machine makes is none, the machine code is left behind the
     /// instruction.
     pub(crate) fn finish_value(&mut self, slow: Block, done: (Block, Ssa), dst: u8, known: Known) {
@@ -386,7 +386,7 @@ impl Translator<'_, '_> {
         self.set(dst, done.1, known);
     }
 
-    /// As [`Translator::finish_value`] when the fast way goes on here with `value`.
+    /// As [`Translator::finish_value`] when the fast path goes on here with `value`.
     pub(crate) fn finish_with(&mut self, slow: Block, value: Ssa, dst: u8) {
         self.finish_as(slow, value, dst, Known::Nothing);
     }
@@ -398,7 +398,7 @@ impl Translator<'_, '_> {
         self.finish_value(slow, done, dst, known);
     }
 
-    /// Ends the fast way of an instruction without a result.
+    /// Ends the fast path of an instruction without a result.
     pub(crate) fn finish_effect(&mut self, slow: Block) {
         let done = self.block();
         self.jump(done);
@@ -415,24 +415,24 @@ impl Translator<'_, '_> {
 
     /// Returns the block that leaves at the instruction at a word.
     pub(crate) fn exit_at(&mut self, at: usize) -> Block {
-        self.way_out(at, AGAIN)
+        self.side_exit(at, AGAIN)
     }
 
     /// Returns the block that leaves at the instruction that is translated, since what was taken for a double
     /// is none.
     pub(crate) fn wrong(&mut self) -> Block {
-        self.way_out(self.at, GUESSED_WRONG)
+        self.side_exit(self.at, GUESSED_WRONG)
     }
 
-    /// Returns the block that puts aside what is kept back, and leaves at the instruction at a word.
-    pub(crate) fn way_out(&mut self, at: usize, status: u64) -> Block {
+    /// Returns the block that saves unspilled doubles, and leaves at the instruction at a word.
+    pub(crate) fn side_exit(&mut self, at: usize, status: u64) -> Block {
         debug_assert!(self.batch.is_none(), "{at}");
-        let way = WayOut { at, status, kept_back: self.kept_back };
-        if let Some(&block) = self.ways_out.get(&way) {
+        let exit = SideExit { at, status, unspilled: self.unspilled };
+        if let Some(&block) = self.side_exits.get(&exit) {
             return block;
         }
         let block = self.cold_block();
-        self.ways_out.insert(way, block);
+        self.side_exits.insert(exit, block);
         block
     }
 
@@ -448,10 +448,10 @@ impl Translator<'_, '_> {
 
     /// Writes the blocks that leave.
     pub(crate) fn emit_exits(&mut self) {
-        for (way, block) in std::mem::take(&mut self.ways_out) {
+        for (exit, block) in std::mem::take(&mut self.side_exits) {
             self.go_to(block);
-            self.put_all_aside(way.kept_back);
-            self.leave_at(way.at, way.status);
+            self.save_unspilled(exit.unspilled);
+            self.leave_at(exit.at, exit.status);
         }
         if let Some(block) = self.signal.take() {
             self.go_to(block);

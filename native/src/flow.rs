@@ -48,12 +48,12 @@ fn is_simple(words: &[u32], may_be_there: impl Fn(Opcode) -> bool) -> bool {
     true
 }
 
-/// Most instructions before the return of a short way.
+/// Most instructions before the return of a short path.
 const SHORT: usize = 4;
 
-/// Returns whether a short way leads from the instruction at a word to a return: past tests of registers, and
-/// what writes constants and registers to others than those of the arguments. Its work in machine code can be
-/// repeated from the beginning of the function.
+/// Returns whether a short path leads from the instruction at a word to a return: past tests of registers,
+/// and what writes constants and registers to others than those of the arguments. Its work in machine code
+/// can be repeated from the beginning of the function.
 fn returns_soon(words: &[u32], at: usize, arguments: u8, most: usize) -> bool {
     let Some(instr) = Instr::decode(words, at).filter(|_| most > 0) else { return false };
     let dst = match instr {
@@ -85,9 +85,10 @@ fn returns_soon(words: &[u32], at: usize, arguments: u8, most: usize) -> bool {
         _ => return false,
     };
     let next = at + instr.opcode().words();
-    let ways = instr.opcode().falls_through().then_some(next).into_iter().chain(target_of(&instr, next));
+    let successors =
+        instr.opcode().falls_through().then_some(next).into_iter().chain(target_of(&instr, next));
     dst.is_none_or(|dst| dst >= arguments)
-        && ways.into_iter().any(|to| returns_soon(words, to, arguments, most - 1))
+        && successors.into_iter().any(|to| returns_soon(words, to, arguments, most - 1))
 }
 
 /// How an instruction leads from one frame to another.
@@ -99,7 +100,7 @@ pub(crate) enum FrameChange {
     Enter { window: u8, count: u8 },
     /// It returns from an inlined function: the value goes to this register.
     Return { to: u8 },
-    /// It is not among the short ways that are inlined of a function: in its place the whole function is
+    /// It is not among the short paths that are inlined of a function: in its place the whole function is
     /// called, with so many arguments. The value goes to this register.
     Call { to: u8, count: u8 },
 }
@@ -125,7 +126,7 @@ pub(crate) struct FlowStep {
 
 impl FlowStep {
     /// Returns the words to which control goes from it.
-    pub(crate) fn ways(&self) -> impl Iterator<Item = usize> + use<> {
+    pub(crate) fn successors(&self) -> impl Iterator<Item = usize> + use<> {
         self.falls_through.then_some(self.next).into_iter().chain(self.target)
     }
 }
@@ -152,7 +153,7 @@ pub(crate) struct FlowFrame<'a> {
 impl FlowFrame<'_> {
     /// Returns whether what is done in it may be done again, in a call of the whole function.
     pub(crate) fn is_begun_again(&self) -> bool {
-        self.part == InlinedPart::ShortWays
+        self.part == InlinedPart::ShortPaths
     }
 }
 
@@ -169,8 +170,8 @@ struct InlinedCall<'a> {
 enum InlinedPart {
     /// All of it.
     Whole,
-    /// The ways on which it returns soon; the function is called where another one begins.
-    ShortWays,
+    /// The paths on which it returns soon; the function is called where another one begins.
+    ShortPaths,
 }
 
 /// Where an inlined function returns to.
@@ -227,7 +228,7 @@ impl<'a> NativeFlow<'a> {
             }
             let step = flow.step(at, &source.inlined)?;
             flow.steps[at] = Some(step);
-            open.extend(step.ways());
+            open.extend(step.successors());
             edges.extend(step.target.map(|to| (to, true)));
             edges.extend(step.falls_through.then_some((step.next, false)));
         }
@@ -263,7 +264,7 @@ impl<'a> NativeFlow<'a> {
             change: FrameChange::None,
         };
         if let Some(back) = frame.back
-            && frame.part == InlinedPart::ShortWays
+            && frame.part == InlinedPart::ShortPaths
             && !returns_soon(&frame.source.words, at - frame.first, back.count, SHORT)
         {
             (step.next, step.target, step.falls_through) = (back.next, Some(back.next), false);
@@ -289,7 +290,7 @@ impl<'a> NativeFlow<'a> {
     }
 
     /// Returns what an instruction of a frame calls, if that is inlined there: a small function that it
-    /// names, or the function itself: all of it once, and its short ways.
+    /// names, or the function itself: all of it once, and its short paths.
     fn callee(&self, frame: usize, instr: &Instr, inlined: &'a [InlinedSource]) -> Option<InlinedCall<'a>> {
         let (window, count) = call_of(instr)?;
         let caller = &self.frames[frame];
@@ -298,7 +299,7 @@ impl<'a> NativeFlow<'a> {
                 let source = caller.source;
                 // Where variables are bound, the calls take less of the time.
                 let is_whole = frame == 0 && is_simple(&source.words, |opcode| opcode != Opcode::Bind);
-                let part = if is_whole { InlinedPart::Whole } else { InlinedPart::ShortWays };
+                let part = if is_whole { InlinedPart::Whole } else { InlinedPart::ShortPaths };
                 let is_inlined = is_whole || returns_soon(&source.words, 0, count.0, SHORT);
                 is_inlined.then_some(InlinedCall { source, guard: None, unsupplied: 0, part })?
             }

@@ -1,8 +1,8 @@
 //! Calls of functions that are inlined, and the returns from them (N8).
 //!
 //! The frame of an inlined function is that of a call: its link is written, and its registers have their
-//! places above those of the caller, where the arguments are. So a way out within it leaves everything as if
-//! it had been called.
+//! places above those of the caller, where the arguments are. So a side exit within it leaves everything as
+//! if it had been called.
 
 use std::mem::offset_of;
 
@@ -29,7 +29,7 @@ impl Translator<'_, '_> {
             (Instr::CallGlobal { symbol, .. }, Some(guard)) => {
                 let function = self.global(symbol.0);
                 let (is_same, redefined) =
-                    (self.equals(function, guard.bits()), self.way_out(self.at, REDEFINED));
+                    (self.equals(function, guard.bits()), self.side_exit(self.at, REDEFINED));
                 self.require(is_same, redefined);
                 function
             }
@@ -71,12 +71,12 @@ impl Translator<'_, '_> {
                 self.set(to, value, Known::Nothing);
             }
             Instr::TailCallGlobal { window, count, symbol } => {
-                self.put_back();
+                self.spill();
                 let function = self.global(symbol.0);
                 self.call_in_place(window.0, count.0, function, to);
             }
             Instr::TailCall { window, count, .. } => {
-                self.put_back();
+                self.spill();
                 let (function, exit) = (self.get(window.0), self.exit());
                 self.require_kind(function, Kind::Function, exit);
                 self.call_in_place(window.0, count.0, function, to);
@@ -99,7 +99,7 @@ impl Translator<'_, '_> {
                     if let Instr::ReturnValues { .. } = instr {
                         self.step();
                     }
-                    self.put_back();
+                    self.spill();
                     self.deliver_values();
                     self.forget(above);
                     self.reload(to, 1);
@@ -112,10 +112,10 @@ impl Translator<'_, '_> {
         self.ended();
     }
 
-    /// Calls the running function, of which the short ways are inlined, in the frame that has been made for
+    /// Calls the running function, of which the short paths are inlined, in the frame that has been made for
     /// it, and goes on behind its call.
     pub(crate) fn call_whole(&mut self, to: u8, step: &FlowStep) {
-        self.put_back();
+        self.spill();
         let (frame, itself, pointer) = (self.base_at(self.at), self.itself, self.pointer);
         let address = self.b.ins().func_addr(pointer, itself);
         let value = self.invoke(to, frame, address, true, Want::ONE);
@@ -159,7 +159,7 @@ impl Translator<'_, '_> {
 
     /// Forgets what registers hold whose frame begins or ends.
     fn forget(&mut self, registers: RegisterBits) {
-        self.kept_back = self.kept_back.without(registers);
+        self.unspilled = self.unspilled.without(registers);
         for (register, known) in self.known.iter_mut().enumerate() {
             if registers.contains(register) {
                 *known = Known::Nothing;

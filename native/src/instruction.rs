@@ -1,4 +1,4 @@
-//! The translation of one instruction: each has the fast ways that the interpreter's arm has, under the same
+//! The translation of one instruction: each has the fast paths that the interpreter's arm has, under the same
 //! conditions; what they do not take goes to the machine, which does the instruction's slow half. What has no
 //! translation here is left to the machine as a whole.
 
@@ -22,7 +22,7 @@ use crate::objects::{ElementIndex, capture};
 use crate::translate::Translator;
 
 impl Translator<'_, '_> {
-    #[allow(clippy::too_many_lines, reason = "one arm for each sort of instruction with a fast way")]
+    #[allow(clippy::too_many_lines, reason = "one arm for each kind of instruction with a fast path")]
     pub(crate) fn instruction(&mut self, step: &FlowStep) {
         use Arithmetic::{Add, Divide, Multiply, Subtract};
         use NumberOrder::{Equal, Greater, Less, LessEqual};
@@ -362,7 +362,7 @@ impl Translator<'_, '_> {
             self.step_test(target, next);
             return self.go_to(next);
         }
-        self.put_back();
+        self.spill();
         self.step();
         step.instr.visit_registers(|access| {
             if let RegisterAccess::Write { first, count } = access {

@@ -52,8 +52,8 @@ pub(crate) struct NativeKinds {
     before: Vec<Option<Box<[Known]>>>,
     /// RegisterBits that are read before they are written, from there on.
     live: Vec<RegisterBits>,
-    /// RegisterBits that may be kept back there.
-    kept_back: Vec<RegisterBits>,
+    /// Registers that may be unspilled there.
+    unspilled: Vec<RegisterBits>,
     /// The guessed kinds of registers.
     guesses: Vec<Known>,
     /// Whether doubles are told from other values at all.
@@ -61,20 +61,20 @@ pub(crate) struct NativeKinds {
 }
 
 impl NativeKinds {
-    /// Follows all ways through a function.
+    /// Follows all paths through a function.
     pub(crate) fn of(flow: &NativeFlow<'_>, source: &NativeSource) -> NativeKinds {
         let mut guesses = source.guesses.clone();
         guesses.resize(flow.registers, Known::Nothing);
         let mut kinds = NativeKinds {
             before: vec![None; flow.steps.len()],
             live: vec![RegisterBits::NONE; flow.steps.len()],
-            kept_back: vec![RegisterBits::NONE; flow.steps.len()],
+            unspilled: vec![RegisterBits::NONE; flow.steps.len()],
             guesses,
             tells_doubles: !source.guesses.is_empty(),
         };
         kinds.find_live(flow);
         kinds.follow(flow);
-        kinds.find_kept_back(flow);
+        kinds.find_unspilled(flow);
         kinds
     }
 
@@ -159,14 +159,14 @@ impl NativeKinds {
         self.live[at].contains(register)
     }
 
-    /// Returns the registers that may be kept back before the instruction at a word.
-    pub(crate) fn kept_back(&self, at: usize) -> RegisterBits {
-        self.kept_back[at]
+    /// Returns the registers that may be unspilled before the instruction at a word.
+    pub(crate) fn unspilled(&self, at: usize) -> RegisterBits {
+        self.unspilled[at]
     }
 
-    /// Returns whether doubles are kept back anywhere.
+    /// Returns whether doubles are unspilled anywhere.
     pub(crate) fn keeps_back(&self) -> bool {
-        self.kept_back.iter().any(|&registers| registers != RegisterBits::NONE)
+        self.unspilled.iter().any(|&registers| registers != RegisterBits::NONE)
     }
 
     fn follow(&mut self, flow: &NativeFlow<'_>) {
@@ -176,7 +176,7 @@ impl NativeKinds {
         let entry: Box<[Known]> = entry.collect();
         self.before[0] = Some(entry);
         let mut open = vec![0];
-        // A loop instruction that no way leads to is an entry all the same.
+        // A loop instruction that no path leads to is an entry all the same.
         let mut entries = flow.loops.clone();
         loop {
             let Some(at) = open.pop() else {
@@ -189,7 +189,7 @@ impl NativeKinds {
             };
             let (Some(step), Some(mut kinds)) = (&flow.steps[at], self.before[at].clone()) else { continue };
             self.apply(flow, step, &mut kinds);
-            for to in step.ways() {
+            for to in step.successors() {
                 if self.meet(flow, to, &kinds) {
                     open.push(to);
                 }
@@ -197,13 +197,13 @@ impl NativeKinds {
         }
     }
 
-    /// Takes away what is not known on another way to a word; returns whether that changed anything.
+    /// Takes away what is not known on another path to a word; returns whether that changed anything.
     fn meet(&mut self, flow: &NativeFlow<'_>, to: usize, kinds: &[Known]) -> bool {
         let live = self.live[to];
-        // Where only one way leads, what was said before is no longer so: a guess depends on what is not
-        // known.
-        let has_one_way = flow.steps[to].as_ref().is_some_and(|step| !step.is_target);
-        if has_one_way && self.before[to].as_deref() != Some(kinds) {
+        // Where only one path leads, what was said before is not valid any more: a guess depends on what is
+        // not known.
+        let has_one_predecessor = flow.steps[to].as_ref().is_some_and(|step| !step.is_target);
+        if has_one_predecessor && self.before[to].as_deref() != Some(kinds) {
             self.before[to] = None;
         }
         let Some(known) = &mut self.before[to] else {
@@ -227,43 +227,43 @@ impl NativeKinds {
         has_changed
     }
 
-    /// Follows all ways once more: a register is kept back if it may be on one of them.
-    fn find_kept_back(&mut self, flow: &NativeFlow<'_>) {
+    /// Follows all paths once more: a register is unspilled if it may be on one of them.
+    fn find_unspilled(&mut self, flow: &NativeFlow<'_>) {
         let mut has_changed = true;
         while has_changed {
             has_changed = false;
             for (at, step) in flow.steps.iter().enumerate() {
                 let (Some(step), Some(mut kinds)) = (step, self.before[at].clone()) else { continue };
-                let mut kept_back = self.kept_back[at];
+                let mut unspilled = self.unspilled[at];
                 if let FrameChange::Enter { window, count } = step.change {
-                    kept_back = kept_back.without(dropped(window, count));
+                    unspilled = unspilled.without(dropped(window, count));
                 } else if let FrameChange::Call { .. } = step.change {
-                    kept_back = RegisterBits::NONE;
+                    unspilled = RegisterBits::NONE;
                 } else if window_of(&step.instr).is_some() && !is_root(&step.instr, &kinds) {
-                    kept_back = RegisterBits::NONE;
+                    unspilled = RegisterBits::NONE;
                 }
                 step.instr.visit_registers(|access| {
                     if let RegisterAccess::Write { first, count } = access {
-                        kept_back.remove_range(usize::from(first), usize::from(count));
+                        unspilled.remove_range(usize::from(first), usize::from(count));
                     }
                 });
                 self.apply(flow, step, &mut kinds);
                 if let FrameChange::Return { to } = step.change {
-                    kept_back = kept_back.without(RegisterBits::all_from(to));
+                    unspilled = unspilled.without(RegisterBits::all_from(to));
                 }
                 if let Some(dst) = computed(step)
                     && kinds[usize::from(dst)] == Known::Double
                 {
-                    kept_back.insert(usize::from(dst));
+                    unspilled.insert(usize::from(dst));
                 }
-                for to in step.ways() {
-                    let mut there = kept_back;
+                for to in step.successors() {
+                    let mut there = unspilled;
                     for (register, known) in self.before(to).iter().enumerate() {
                         if !matches!(known, Known::Double | Known::Spent) {
                             there.remove(register);
                         }
                     }
-                    has_changed |= self.kept_back[to].unite(there);
+                    has_changed |= self.unspilled[to].unite(there);
                 }
             }
         }
@@ -284,7 +284,7 @@ impl NativeKinds {
 
     fn live_before(&self, step: &FlowStep) -> RegisterBits {
         let mut live = RegisterBits::NONE;
-        for to in step.ways() {
+        for to in step.successors() {
             live.unite(self.live[to]);
         }
         match step.change {

@@ -10,12 +10,12 @@
 //!   of that frame, and links and registers of frames that it makes above it, below [`NativeContext::limit`].
 //! * **N3, truth.** Where machine code is left, and before it calls anything, all results are in the task's
 //!   stack. So whatever the machine code leaves can be taken up by the interpreter, at the instruction that
-//!   [`NativeContext::pc`] names in the frame [`NativeContext::base`]. Between, doubles may be kept back.
-//!   On a way out they are put aside, as they are; [`NativeContext::put_aside`] names them by their distance
-//!   from [`NativeContext::outer`], and the machine writes their words to the stack before anything else
-//!   looks.
-//!   Where the function returns, they are no more; other words without an address are in their places.
-//!   Functions of the machine that look at no frame may be called while some are kept back.
+//!   [`NativeContext::pc`] names in the frame [`NativeContext::base`]. Between, doubles may be *unspilled*: only
+//!   in a register of the processor. A side exit saves them in [`NativeContext::doubles`];
+//!   [`NativeContext::unspilled`] names them by their distance from [`NativeContext::outer`], and the machine
+//!   writes their words to the stack before anything else reads it.
+//!   Where the function returns, they are dropped; other words without an address are in their places.
+//!   Functions of the machine that read no frame may be called while some are unspilled.
 //! * **N4, exits.** Machine code is left at the beginning of an instruction, before it has had any effect
 //!   ([`AGAIN`]), or behind a function of the machine that has done the instruction and says what is to be
 //!   done next ([`SIGNAL`], [`RETURN_VALUES`]), or with the value of the function ([`RETURNED`]).
@@ -29,7 +29,7 @@
 //!   fit between the base at the entry and [`NativeContext::limit`], which the interpreter keeps near.
 //! * **N8, inlined functions.** A call of a global function, or of the running one, may be replaced by the
 //!   instructions of the function. Its frame is made all the same, so that N3 to N5 hold within it. Or only
-//!   the ways are inlined on which the running function returns soon: what they do before another way
+//!   the paths are inlined on which the running function returns soon: what they do before another path
 //!   branches off can be repeated, and calls no function of the machine; there the function is called in the
 //!   frame that has been made. The call of a global function is given up, with [`REDEFINED`], if the symbol
 //!   has another function by then. So the machine code is good only as long as the functions inlined in it

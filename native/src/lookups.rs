@@ -73,7 +73,7 @@ struct LookupInLine {
 impl Translator<'_, '_> {
     /// Does a builtin of hash tables.
     pub(crate) fn lookup(&mut self, window: u8, count: u8, operation: TableOperation) {
-        self.put_back();
+        self.spill();
         self.tick();
         let (slow, absent) = (self.cold_block(), self.block());
         let ((found, entry), (done, value)) = (self.block_with_value(), self.block_with_value());

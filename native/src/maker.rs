@@ -93,7 +93,7 @@ impl MachineCodeMaker {
     /// [`NotMade::Unsupported`].
     pub fn new() -> Result<MachineCodeMaker, NotMade> {
         if cfg!(not(all(unix, any(target_arch = "x86_64", target_arch = "aarch64")))) {
-            return Err(NotMade::Unsupported("this system has another way of calling".into()));
+            return Err(NotMade::Unsupported("this system has another calling convention".into()));
         }
         Ok(MachineCodeMaker {
             isa: generator("none")?,

@@ -70,7 +70,7 @@ impl Translator<'_, '_> {
     }
 
     /// An element of a simple vector. The interpreter handles other arrays and invalid indexes. One that is
-    /// guessed to be a double is kept back, and joins the batch.
+    /// guessed to be a double stays unspilled, and joins the batch.
     pub(crate) fn simple_element_ref(&mut self, dst: u8, vector: u8, index: ElementIndex) {
         if self.guess == Some(dst) {
             let (vector, index) = (self.get(vector), self.index_operand(index));
@@ -95,7 +95,7 @@ impl Translator<'_, '_> {
         }
     }
 
-    /// As [`Translator::element`], on the way that control takes always. Neither kind nor length of a vector
+    /// As [`Translator::element`], on the path that control always takes. Neither kind nor length of a vector
     /// changes, so they are looked at once.
     fn simple_element(&mut self, vector: Ssa, index: (Ssa, Known), exit: Block) -> Ssa {
         let length = match self.lengths.get(&vector) {
@@ -178,7 +178,7 @@ impl Translator<'_, '_> {
         self.b.ins().band_imm_s(found, i64::from(flags))
     }
 
-    /// Makes a pair: by a function of the machine that looks at no frame, or by the machine if that takes a
+    /// Makes a pair: by a function of the machine that reads no frame, or by the machine if that takes a
     /// look at the heap.
     pub(crate) fn cons(&mut self, dst: u8, car: u8, cdr: u8) {
         self.make_word(usize::from(car));

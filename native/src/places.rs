@@ -70,14 +70,14 @@ impl RegisterBits {
     }
 }
 
-/// Where machine code is left, and what has to be put aside before that. Two ways out with the
-/// same answer share a block.
+/// A side exit: where machine code is left, and the doubles to be saved before that. Equal side exits share a
+/// block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct WayOut {
+pub(crate) struct SideExit {
     /// Word of the instruction that the interpreter does next.
     pub(crate) at: usize,
     /// One of the statuses of `abi`.
     pub(crate) status: u64,
-    /// RegisterBits that are kept back, or may be.
-    pub(crate) kept_back: RegisterBits,
+    /// Registers that are unspilled, or may be.
+    pub(crate) unspilled: RegisterBits,
 }

@@ -1,5 +1,5 @@
 //! Special variables. Functions of the machine do the work that depends on the bindings of the task. Those
-//! that read or set a variable read nothing of the frame: what is kept back stays so.
+//! that read or set a variable read nothing of the frame: unspilled doubles stay so.
 
 use std::mem::offset_of;
 
@@ -59,7 +59,7 @@ impl Translator<'_, '_> {
 
     /// Has the machine bind a variable, or end bindings.
     pub(crate) fn bind(&mut self, helper: usize) {
-        self.put_back();
+        self.spill();
         let (outcome, signal) = (self.call_helper(helper), self.signal());
         self.refuse(outcome, signal);
     }

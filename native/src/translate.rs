@@ -1,7 +1,7 @@
 //! The translation of a function: its entries and blocks, and what is known of its registers.
 //!
 //! Each register of the frame, and of the frames of inlined functions, is a variable of the code generator,
-//! and every write goes to the stack as well, but for doubles that are kept back (N3).
+//! and every write goes to the stack as well, but for unspilled doubles (N3).
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -19,7 +19,7 @@ use crate::emit::WORD;
 use crate::flow::{FlowFrame, FlowStep, NativeFlow};
 use crate::kinds::{Known, NativeKinds};
 use crate::maker::NativeSource;
-use crate::places::{RegisterBits, WayOut};
+use crate::places::{RegisterBits, SideExit};
 
 /// A translation under way.
 pub(crate) struct Translator<'a, 'f> {
@@ -38,18 +38,18 @@ pub(crate) struct Translator<'a, 'f> {
     /// The known kind of each register here.
     pub(crate) known: Vec<Known>,
     /// RegisterBits that hold doubles that are not in their places, or may hold such.
-    pub(crate) kept_back: RegisterBits,
+    pub(crate) unspilled: RegisterBits,
     /// The words of doubles, where they are at hand.
     pub(crate) words: Vec<Option<Ssa>>,
     /// Results that are not tested yet.
     pub(crate) batch: Option<DoubleBatch>,
     /// The results of operations on doubles on all paths to here, tested or in the batch.
     pub(crate) results: HashMap<(Arithmetic, Ssa, Ssa), Ssa>,
-    /// The lengths of what is known to be simple vectors on all ways here.
+    /// The lengths of what is known to be simple vectors on all paths here.
     pub(crate) lengths: HashMap<Ssa, Ssa>,
     blocks: BTreeMap<usize, Block>,
     edges: Vec<(Block, usize, Vec<EdgeWork>)>,
-    pub(crate) ways_out: BTreeMap<WayOut, Block>,
+    pub(crate) side_exits: BTreeMap<SideExit, Block>,
     pub(crate) signal: Option<Block>,
     pub(crate) helper_signature: SigRef,
     pub(crate) store_signature: SigRef,
@@ -102,7 +102,7 @@ impl<'a, 'f> Translator<'a, 'f> {
             context,
             base,
             known: vec![Known::Nothing; flow.registers],
-            kept_back: RegisterBits::NONE,
+            unspilled: RegisterBits::NONE,
             words: vec![None; flow.registers],
             batch: None,
             results: HashMap::new(),
@@ -111,7 +111,7 @@ impl<'a, 'f> Translator<'a, 'f> {
             doubles,
             blocks: BTreeMap::new(),
             edges: Vec::new(),
-            ways_out: BTreeMap::new(),
+            side_exits: BTreeMap::new(),
             signal: None,
             helper_signature: helper,
             store_signature: store,
@@ -200,13 +200,13 @@ impl<'a, 'f> Translator<'a, 'f> {
         self.b.def_var(self.variables[register], value);
         match known {
             Known::Fixnum => {
-                let wrong = self.way_out(at, GUESSED_WRONG);
+                let wrong = self.side_exit(at, GUESSED_WRONG);
                 let tag = self.b.ins().band_imm_s(value, 3);
                 self.refuse(tag, wrong);
             }
             // A later exit spills it, read or not.
             Known::Double => {
-                let wrong = self.way_out(at, GUESSED_WRONG);
+                let wrong = self.side_exit(at, GUESSED_WRONG);
                 let double = self.double_of(value, wrong);
                 self.b.def_var(self.doubles[register], double);
             }
@@ -225,7 +225,7 @@ impl<'a, 'f> Translator<'a, 'f> {
                 self.jump(block);
             }
             self.b.switch_to_block(block);
-            self.kept_back = self.kinds.kept_back(at);
+            self.unspilled = self.kinds.unspilled(at);
             self.words.fill(None);
             self.results.clear();
             self.lengths.clear();

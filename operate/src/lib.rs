@@ -1,11 +1,11 @@
 //! Operating a run from outside: metrics, the monitor, and sessions of operators.
 //!
-//! Servers live on the event loop of `world/`. What they only look at they see by surveys, which change
-//! nothing in the run; what they do comes through the machine's inbox. Without an option nothing here runs.
+//! Servers live on the event loop of `world/`. They read the run through surveys, which have no side effects;
+//! commands go through the machine's inbox. Without an option nothing here runs.
 //!
-//! Guarantees: other machines reach nothing without having been told to by an address, and then over TLS
-//! only; what may do anything asks for a secret, which is compared in constant time; what is asked is bounded
-//! before it is parsed. Nothing here prints: what is to be said goes to a function of the caller.
+//! Guarantees: other machines reach a server only at an address that an option names, and over TLS; a server
+//! that accepts commands asks for a secret, which is compared in constant time; the size of a request is
+//! bounded before it is parsed. Nothing here prints: lines for the user go to a function of the caller.
 //!
 //! ```
 //! use esl::Config;
@@ -225,9 +225,9 @@ pub fn parse_address(text: &str) -> Result<SocketAddr, &'static str> {
 }
 
 impl ServedPlaces {
-    /// Loads the functions of the library that the services call into a machine that is about to run a program.
-    /// [`begin`](Self::begin) does that too; to record the run, call this before anything else changes the
-    /// machine, as a replay does.
+    /// Loads the functions of the library that the services call into a machine that is about to run a
+    /// program. [`begin`](Self::begin) does that too; to record the run, call this before anything else
+    /// changes the machine, as a replay does.
     ///
     /// # Errors
     /// [`OperateError::Library`].
@@ -283,7 +283,7 @@ impl ServedPlaces {
             served.monitor = Some(handle?);
         }
         if let Some(place) = &self.listen {
-            let door = match parse_address(place) {
+            let entrance = match parse_address(place) {
                 Ok(address) => {
                     self.keeps_secret(address)?;
                     let secrets = self.secrets()?;
@@ -296,14 +296,14 @@ impl ServedPlaces {
                 }
                 Err(_) => {
                     let path = PathBuf::from(place);
-                    let door = listen_at_path(&path)?;
+                    let entrance = listen_at_path(&path)?;
                     say(&format!("; operators attach with eslvm attach {place}"));
                     served.socket = Some(path);
                     may_signal = true;
-                    door
+                    entrance
                 }
             };
-            served.sessions = Some(attach::serve(machine, door, scope)?);
+            served.sessions = Some(attach::serve(machine, entrance, scope)?);
         }
         if may_signal {
             machine.inbox().put(Incoming::Attended);

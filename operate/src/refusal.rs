@@ -20,8 +20,8 @@ pub(super) enum OperatorRefusal {
         /// Role of the session.
         held: OperatorRole,
     },
-    /// The session may only look.
-    LooksOnly,
+    /// The session may only survey the run.
+    ObservesOnly,
     /// An argument of the request is missing, or is not what it has to be.
     Argument {
         /// Name of the request.
@@ -101,7 +101,7 @@ impl fmt::Display for OperatorRefusal {
             OperatorRefusal::Role { request, needed, held } => {
                 write!(f, "`{request}` needs the role {needed}, and this session has {held}")
             }
-            OperatorRefusal::LooksOnly => f.write_str("this session may only survey the run"),
+            OperatorRefusal::ObservesOnly => f.write_str("this session may only survey the run"),
             OperatorRefusal::Argument { request, needed } => write!(f, "`{request}` needs {needed}"),
             OperatorRefusal::NoNumber => f.write_str("it needs the number of a task"),
             OperatorRefusal::Wraps { request, only } => {

@@ -157,7 +157,7 @@ impl Secrets {
         found
     }
 
-    /// Returns whether any of them is for more than to look.
+    /// Returns whether any of them permits more than surveys.
     pub(super) fn may_signal(&self) -> bool {
         self.0.iter().any(|(role, _)| *role >= OperatorRole::Command)
     }

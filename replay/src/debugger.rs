@@ -435,7 +435,7 @@ impl Debugger {
         self.left_at = Some(self.ticks());
         let Rerun { machine, host, .. } = &mut self.rerun;
         host.detach();
-        machine.set_tasks_aside();
+        machine.stop_all_tasks();
         machine.flush();
         let captured = host.captured();
         let before = (captured.output().len(), captured.error().len());

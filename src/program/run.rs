@@ -263,7 +263,7 @@ pub fn run_by(
 }
 
 /// Runs a program as [`run_in`] does, in portions of so many ticks, which changes nothing in the run, and
-/// calls `look` after each.
+/// calls `inspect` after each.
 ///
 /// # Errors
 /// As [`run`].
@@ -271,12 +271,12 @@ pub fn run_in_portions(
     machine: &mut Vm,
     program: &Program,
     ticks: u64,
-    look: &mut dyn FnMut(&mut Vm),
+    inspect: &mut dyn FnMut(&mut Vm),
 ) -> Result<Summary, Error> {
     run_as(machine, program, |machine| {
         loop {
             let outcome = machine.run(ticks);
-            look(machine);
+            inspect(machine);
             if outcome != RunOutcome::TicksUsed {
                 return outcome;
             }
@@ -403,21 +403,21 @@ mod tests {
         assert_eq!(ends(waits, &mut machine), Ended::Failed);
     }
 
-    /// Looks at the machine whenever something happens.
+    /// Surveys the machine whenever something happens.
     struct Onlooker {
         inbox: Inbox,
         seen: Arc<Mutex<Vec<Survey>>>,
-        looks: u64,
+        surveys: u64,
     }
 
     impl Observer for Onlooker {
         fn see(&mut self, _: u64, _: TaskNumber, _: Seen<'_>) {
-            self.looks += 1;
+            self.surveys += 1;
             let request = SurveyRequest {
                 tasks: 100,
                 data: true,
                 facts: Some((String::new(), 0)),
-                frames_of: Some(self.looks % 9),
+                frames_of: Some(self.surveys % 9),
                 failures_after: Some(0),
                 ..SurveyRequest::default()
             };
@@ -428,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn who_looks_on_changes_nothing() {
+    fn surveys_change_nothing() {
         let text = "(define-property mode ())
             (define-input news :capacity 2)
             (define-resource arm)
@@ -445,7 +445,7 @@ mod tests {
             if is_watched {
                 machine.keep_journal();
                 machine.gather_figures(true);
-                let onlooker = Onlooker { inbox: machine.inbox(), seen: Arc::clone(&seen), looks: 0 };
+                let onlooker = Onlooker { inbox: machine.inbox(), seen: Arc::clone(&seen), surveys: 0 };
                 machine.coming_observers().add(Box::new(onlooker));
                 machine.inbox().inspect(Inspection::Watch);
             }

@@ -20,7 +20,7 @@ pub(crate) struct Cpu {
     pub(crate) wants_one: bool,
     /// Ticks left until the next safepoint.
     pub(crate) ticks: i32,
-    /// Ticks kept back so that the collector has its turn at the next tick.
+    /// Ticks withheld so that the collector has its turn at the next tick.
     pub(crate) reserve: i32,
     /// Ticks of this slice that were given out at its beginning.
     pub(crate) granted: i32,

@@ -158,7 +158,7 @@ const CASES: [(&str, &str); 10] = [
          (setf (symbol-function 'half) (lambda (x &optional (by 0.75)) (* x by))) (print (safe 50))",
     ),
     (
-        "special variables while doubles are kept back",
+        "special variables while doubles are unspilled",
         "(defvar *x* 1.5) (defvar *y* 2) (defvar *z* 0.25) (defvar *free*)
          (defconstant +c+ 3.5)
          (defun turn (n)

@@ -444,7 +444,7 @@ impl Host for ReplayHost {
     }
 
     fn broken_output_status(&self) -> u8 {
-        let answer = self.next_plain::<BrokenOutput>("for the status of an output that nobody reads");
+        let answer = self.next_plain::<BrokenOutput>("for the status of a closed output");
         answer.map_or(0, |answer| answer.0)
     }
 }

@@ -1,7 +1,7 @@
 //! Sessions of operators attached to a run: the server.
 //!
 //! The wire protocol is that of SLIME's server, SWANK: packets of forms, each request with a number, each
-//! answer with that of its request. A request says what it needs by its role; one that only looks is
+//! answer with that of its request. A request says what it needs by its role; one that only observes is
 //! answered by a survey, all others come through the inbox of the machine as calls, aborts and signals.
 //!
 //! Guarantees: a connection over TCP says its secret before anything else is parsed, and soon, and until
@@ -74,7 +74,7 @@ pub(super) enum Entrance {
 /// The reason, if there is no event loop.
 pub(super) fn serve(
     machine: &mut Vm,
-    door: Entrance,
+    entrance: Entrance,
     scope: RunScope,
 ) -> Result<SessionsHandle, NoEventLoop> {
     let outboxes = Outboxes::default();
@@ -92,7 +92,7 @@ pub(super) fn serve(
     let places = OperatorRole::ALL.map(|_| Arc::new(Semaphore::new(SESSIONS)));
     let handle = SessionsHandle(outboxes.clone());
     let attendance = Attendance { scope, outboxes, sessions: AtomicU64::new(0), places };
-    esl_world::spawn(accept(door, Arc::new(attendance)))?;
+    esl_world::spawn(accept(entrance, Arc::new(attendance)))?;
     Ok(handle)
 }
 
@@ -191,9 +191,9 @@ impl Attendance {
     }
 }
 
-async fn accept(door: Entrance, attendance: Arc<Attendance>) {
+async fn accept(entrance: Entrance, attendance: Arc<Attendance>) {
     // They have been made for this, so the event loop takes them.
-    match door {
+    match entrance {
         Entrance::Tcp(listener, secrets, identity) => {
             let lobby = Lobby::default();
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };

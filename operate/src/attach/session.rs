@@ -104,7 +104,7 @@ impl OperatorSession {
         match request {
             SessionRequest::Connect => Ok(self.description()),
             SessionRequest::Tasks => {
-                let survey = self.look(SurveyRequest { tasks: TASKS, ..SurveyRequest::default() }).await?;
+                let survey = self.survey(SurveyRequest { tasks: TASKS, ..SurveyRequest::default() }).await?;
                 let mut tree = survey.tree_text();
                 if tree.is_empty() {
                     tree.push_str("No tasks.\n");
@@ -208,8 +208,9 @@ impl OperatorSession {
         match step {
             SlimeStep::Answer(answer) => Ok(answer),
             SlimeStep::Tasks => {
-                let survey =
-                    self.look(SurveyRequest { tasks: TASKS, data: true, ..SurveyRequest::default() }).await?;
+                let survey = self
+                    .survey(SurveyRequest { tasks: TASKS, data: true, ..SurveyRequest::default() })
+                    .await?;
                 *self.table() = survey.tasks.iter().map(|task| task.number).collect();
                 Ok(slime::table(&survey.tasks, &survey.locks))
             }
@@ -314,14 +315,14 @@ impl OperatorSession {
     }
 
     fn sender(&self) -> Result<&Sender, OperatorRefusal> {
-        self.sender.as_ref().ok_or(OperatorRefusal::LooksOnly)
+        self.sender.as_ref().ok_or(OperatorRefusal::ObservesOnly)
     }
 
     async fn is_paused(&self) -> Result<bool, OperatorRefusal> {
-        Ok(self.look(SurveyRequest::default()).await?.figures.is_paused)
+        Ok(self.survey(SurveyRequest::default()).await?.figures.is_paused)
     }
 
-    async fn look(&self, request: SurveyRequest) -> Result<esl_host::Survey, OperatorRefusal> {
+    async fn survey(&self, request: SurveyRequest) -> Result<esl_host::Survey, OperatorRefusal> {
         self.scope.survey(request).await.ok_or(OperatorRefusal::Silent)
     }
 
@@ -329,7 +330,7 @@ impl OperatorSession {
     async fn task(&self, number: u64) -> Result<(SurveyedTask, Vec<esl_host::FrameRow>), OperatorRefusal> {
         let request =
             SurveyRequest { named: vec![number], frames_of: Some(number), ..SurveyRequest::default() };
-        let survey = self.look(request).await?;
+        let survey = self.survey(request).await?;
         let row = survey.tasks.into_iter().next();
         row.map(|row| (row, survey.frames)).ok_or(OperatorRefusal::NoTask(number))
     }
@@ -351,7 +352,7 @@ impl OperatorSession {
         let from = arguments.get(1).and_then(WireForm::as_integer).and_then(|n| usize::try_from(n).ok());
         let from = from.unwrap_or(0);
         let facts = Some((name.clone(), from));
-        let survey = self.look(SurveyRequest { data: true, facts, ..SurveyRequest::default() }).await?;
+        let survey = self.survey(SurveyRequest { data: true, facts, ..SurveyRequest::default() }).await?;
         if survey.facts.is_empty() {
             return Ok(WireForm::text("There are none.\n"));
         }
@@ -365,7 +366,7 @@ impl OperatorSession {
     }
 
     async fn data(&self) -> Result<WireForm, OperatorRefusal> {
-        let survey = self.look(SurveyRequest { data: true, ..SurveyRequest::default() }).await?;
+        let survey = self.survey(SurveyRequest { data: true, ..SurveyRequest::default() }).await?;
         let mut text = String::new();
         for row in &survey.relations {
             let what = if row.is_property { "property" } else { "relation" };
@@ -387,7 +388,8 @@ impl OperatorSession {
     }
 
     async fn failures(&self) -> Result<WireForm, OperatorRefusal> {
-        let survey = self.look(SurveyRequest { failures_after: Some(0), ..SurveyRequest::default() }).await?;
+        let survey =
+            self.survey(SurveyRequest { failures_after: Some(0), ..SurveyRequest::default() }).await?;
         let mut text = String::new();
         for row in survey.failures {
             let place = row.place.map_or(String::new(), |place| format!(", {place}"));

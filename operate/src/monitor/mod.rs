@@ -37,9 +37,9 @@ use request::{Admitted, MonitorCommand, MonitorRequest, admit, parse};
 
 /// The page; `NONCE` stands for what its script and its style are marked with.
 const PAGE: &str = include_str!("page.html");
-/// Time between two looks at the run.
+/// Time between two surveys of the run.
 const PERIOD: Duration = Duration::from_millis(250);
-/// Tasks that one look tells of, beside those that are seen.
+/// Tasks that one survey reports, beside those that viewers see.
 const PAGE_OF_TASKS: usize = 2000;
 /// Most viewers of one role.
 const VIEWERS: usize = 8;
@@ -58,8 +58,8 @@ struct MonitorState {
     views: Mutex<BTreeMap<String, ViewerView>>,
     /// Notified when a viewer comes.
     coming: Notify,
-    /// Changes with each look.
-    looks: watch::Sender<u64>,
+    /// Changes with each survey.
+    updates: watch::Sender<u64>,
     /// Name of the program.
     program: String,
     /// How the run has ended, once it has.
@@ -76,7 +76,7 @@ impl MonitorHandle {
     pub(super) fn end(&self, end: RunEnd, last: Survey) {
         lock(&self.0.model).take_last(last);
         *lock(&self.0.end) = Some(end);
-        self.0.looks.send_modify(|look| *look += 1);
+        self.0.updates.send_modify(|count| *count += 1);
     }
 
     /// Returns whether all viewers have been told, so that their connections have ended.
@@ -109,20 +109,20 @@ pub(super) fn serve(
         model: Mutex::default(),
         views: Mutex::default(),
         coming: Notify::new(),
-        looks: watch::Sender::new(0),
+        updates: watch::Sender::new(0),
         program,
         end: Mutex::default(),
         lobby: Lobby::default(),
     });
-    esl_world::spawn(look_on(monitor.clone()))?;
+    esl_world::spawn(survey_for_viewers(monitor.clone()))?;
     let handle = MonitorHandle(monitor.clone());
     let lobby = monitor.lobby.clone();
     http::serve(listener, identity, lobby, move |request, visit| answer(monitor.clone(), request, visit))?;
     Ok(handle)
 }
 
-/// Looks at the run again and again while there are viewers.
-async fn look_on(monitor: Arc<MonitorState>) {
+/// Surveys the run periodically while there are viewers.
+async fn survey_for_viewers(monitor: Arc<MonitorState>) {
     loop {
         if lock(&monitor.views).is_empty() {
             monitor.coming.notified().await;
@@ -148,7 +148,7 @@ async fn look_on(monitor: Arc<MonitorState>) {
             model.take(survey, PAGE_OF_TASKS, Instant::now());
             model.drop_missing(&named, &told);
         }
-        monitor.looks.send_modify(|look| *look += 1);
+        monitor.updates.send_modify(|count| *count += 1);
         tokio::time::sleep(PERIOD).await;
     }
 }
@@ -186,8 +186,8 @@ async fn answer(
     }
 }
 
-/// Takes bytes as those of a connection, and parses its requests; performs none. Returns the number of requests
-/// that were understood.
+/// Takes bytes as those of a connection, and parses its requests; performs none. Returns the number of
+/// requests that were understood.
 #[cfg(any(test, fuzzing))]
 pub(super) fn understand(secrets: &Secrets, bytes: &[u8]) -> usize {
     crate::noise::http::understand(bytes, |head, body| match admit(secrets, "http://", head) {
@@ -247,7 +247,7 @@ fn events(
         let _watching = &watching;
         // A viewer that may signal keeps a waiting run from ending as deadlocked.
         let _sender = (role >= OperatorRole::Command).then(|| monitor.scope.sender());
-        let mut looks = monitor.looks.subscribe();
+        let mut updates = monitor.updates.subscribe();
         loop {
             let end = lock(&monitor.end).clone();
             let Some(mut message) = message(&watching, role, end.is_none()).await else { return };
@@ -262,7 +262,7 @@ fn events(
             if end.is_some() {
                 return;
             }
-            if looks.changed().await.is_err() {
+            if updates.changed().await.is_err() {
                 return;
             }
         }
@@ -339,7 +339,7 @@ fn set_view(monitor: &MonitorState, viewer: &str, wanted: ViewerView) -> Respons
         }
         None => return plain(StatusCode::CONFLICT, "this viewer does not watch\n"),
     }
-    monitor.looks.send_modify(|look| *look += 1);
+    monitor.updates.send_modify(|count| *count += 1);
     with(StatusCode::OK, "application/json", "{}")
 }
 

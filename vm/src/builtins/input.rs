@@ -39,7 +39,7 @@ pub(super) fn add_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             input
         }
     };
-    vm.outside.inbox.open_door(&key, (when_full == WhenFull::Wait).then_some(capacity));
+    vm.outside.inbox.open_input(&key, (when_full == WhenFull::Wait).then_some(capacity));
     Ok(input)
 }
 
@@ -55,7 +55,7 @@ pub(super) fn remove_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         && let Some(input) = vm.outside.inputs.remove(&key)
     {
         vm.heap.log_if_marking(input);
-        vm.outside.inbox.remove_door(&key);
+        vm.outside.inbox.remove_input(&key);
     }
     Ok(Value::NIL)
 }

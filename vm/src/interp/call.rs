@@ -1,4 +1,4 @@
-//! Calls that do not take the fast way: other callees than functions with exactly the given arguments,
+//! Calls that do not take the fast path: other callees than functions with exactly the given arguments,
 //! natives called as functions, applications, and calls for which the stack has to grow.
 //!
 //! A call is made ready before it has any effect, so that one that fails, or lacks room, leaves the frame as

@@ -1,4 +1,4 @@
-//! The fast way of calls of functions with optional, rest and key parameters: the arguments are put in the
+//! The fast path of calls of functions with optional, rest and key parameters: the arguments are put in the
 //! order of the parameters in the window of the call, where they are the first registers of the new frame.
 //!
 //! Whatever is unusual (wrong numbers of arguments, unknown keys, many arguments, lack of room) is left to
@@ -17,7 +17,7 @@ const MOST: usize = 16;
 const MOST_KEYS: usize = 23;
 
 /// Puts the first `count` of `registers` in the order of the parameters of `code`. Returns the number of
-/// parameters; `None` if the call has to take the slow way.
+/// parameters; `None` if the call has to take the slow path.
 ///
 /// # Safety
 /// `code` is the Code of a function with bytecode; `registers` lie behind the window of a call in the running
@@ -61,7 +61,7 @@ pub(super) unsafe fn arrange(
             }
         }
         if shape.rest {
-            // Without room, the slow way finds that there is none.
+            // Without room, the slow path finds that there is none.
             let list = vm.heap.list(copies).ok()?;
             *registers.add(positional) = list;
         }

@@ -122,7 +122,7 @@ pub(crate) enum Signal {
     Tick,
     /// A builtin gave no value, or an instruction failed as a builtin does.
     Exit(Exit),
-    /// The call of this instruction takes the slow way.
+    /// The call of this instruction takes the slow path.
     Call,
     /// The values in the value list are to be delivered to the caller of this frame.
     ReturnAll,

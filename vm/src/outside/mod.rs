@@ -169,7 +169,7 @@ impl Outside {
 
 impl Drop for Outside {
     fn drop(&mut self) {
-        self.inbox.close_doors();
+        self.inbox.close_inputs();
         self.inbox.end_answers();
         self.inbox.end_inspections();
     }

@@ -1,6 +1,6 @@
 //! Where tasks stand between two portions of a run: their frames, and what they are about to call.
 //!
-//! For debuggers: nothing here changes the run, save [`Vm::set_tasks_aside`], after which it is over.
+//! For debuggers: nothing here changes the run, save [`Vm::stop_all_tasks`], after which it is over.
 
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::opcode::{CallTarget, Instr};
@@ -86,9 +86,8 @@ impl Vm {
         }
     }
 
-    /// Lets no task have a turn any more, so that what is called from now on runs alone. The run itself is
-    /// over.
-    pub fn set_tasks_aside(&mut self) {
+    /// Ends the turns of all tasks, so that a call from now on runs alone. The run itself is over.
+    pub fn stop_all_tasks(&mut self) {
         let scheduler = &mut self.scheduler;
         scheduler.open_turn = None;
         scheduler.queues = RunQueues::default();

@@ -14,7 +14,7 @@ use crate::schedule::{Due, Scheduler};
 use crate::task::Task;
 use crate::vm::Vm;
 
-/// Ticks between two looks at the clock while tasks are running.
+/// Ticks between two readings of the clock while tasks are running.
 const CLOCK_TICKS: u64 = 2000;
 /// Ticks after which virtual time moves although tasks are running.
 const VIRTUAL_TICKS: u64 = 10_000_000;

@@ -289,7 +289,7 @@ fn add_immediate(rows: &mut HostRows) {
     });
 }
 
-/// Returns options that open a file without waiting for anybody, such as the other end of a FIFO.
+/// Returns options that open a file without waiting, such as for the other end of a FIFO.
 fn at_once(options: &mut OpenOptions) -> &mut OpenOptions {
     #[cfg(unix)]
     {

@@ -272,7 +272,7 @@ fn add_connections(rows: &mut HostRows) {
         "%SOCKET-SEND",
         ["socket", "contents"],
         "Writes CONTENTS, a text or bytes, as far as the system takes them without delay. Returns NIL if that was \
-         all; otherwise T if the rest is kept, and 0 if somebody else writes.",
+         all; otherwise T if the rest is kept, and 0 if another task writes.",
         connection::send,
     );
     rows.operation(

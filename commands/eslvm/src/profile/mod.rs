@@ -1,7 +1,7 @@
 //! Profiles: where a run spends its ticks and its time, by task, calls and line.
 //!
 //! The run is divided into portions of a prime number of ticks, which changes nothing in it. What a task has
-//! used since the profile looked at it last counts for the calls in which it stands when a portion ends in
+//! used since its last sample counts for the calls in which it stands when a portion ends in
 //! its turn. So the sums are exact, those of tasks too, and other parts the more so the larger they are. A
 //! task that ends before a portion has ended in its turn has no calls.
 //!
@@ -17,7 +17,7 @@
 //! let program = compile(&[Source::new("busy.esl", text)]).program.expect("there are no errors");
 //! let mut machine = machine(Config::default(), Box::new(VirtualHost::new()))?;
 //! let mut profile = Profile::begin(&mut machine);
-//! run_in_portions(&mut machine, &program, INTERVAL, &mut |machine| profile.look(machine))?;
+//! run_in_portions(&mut machine, &program, INTERVAL, &mut |machine| profile.sample(machine))?;
 //! profile.end(&mut machine);
 //! assert_eq!(profile.functions()[0].name, "BUSY");
 //! assert_eq!(profile.sum().ticks, machine.ticks());
@@ -31,9 +31,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 pub use esl_vm::observe::UsedResources;
 use esl_vm::vm::Vm;
 
-/// Ticks between two looks at a run.
+/// Ticks between two samples of a run.
 pub const INTERVAL: u64 = 997;
-/// Calls of a stack that are looked at, the innermost ones.
+/// Calls of a stack that a sample has, the innermost ones.
 const DEPTH: usize = 200;
 /// Tasks that are told apart of those that have no calls; the others count together.
 const SHORT_TASKS: usize = 100;
@@ -85,8 +85,8 @@ impl Profile {
         Profile::default()
     }
 
-    /// Looks at a machine between two portions of its run.
-    pub fn look(&mut self, machine: &mut Vm) {
+    /// Samples the calls of a machine between two portions of its run.
+    pub fn sample(&mut self, machine: &mut Vm) {
         for (task, used) in machine.take_used_by_ended() {
             self.add_without_calls(task, used);
         }
@@ -107,7 +107,7 @@ impl Profile {
     }
 
     /// Ends the profile, after the run and the cleanups at its end: takes in what was used since the last
-    /// looks at the tasks.
+    /// samples of the tasks.
     pub fn end(&mut self, machine: &mut Vm) {
         for (task, used) in machine.take_all_used() {
             self.add_without_calls(task, used);
@@ -211,8 +211,8 @@ mod tests {
         let summary = run_in(&mut alone, &program).expect("it runs");
         let mut watched = machine(Config::DEFAULT, host()).expect("there is room");
         let mut profile = Profile::begin(&mut watched);
-        let look = &mut |machine: &mut Vm| profile.look(machine);
-        let same = run_in_portions(&mut watched, &program, INTERVAL, look).expect("it runs");
+        let sample = &mut |machine: &mut Vm| profile.sample(machine);
+        let same = run_in_portions(&mut watched, &program, INTERVAL, sample).expect("it runs");
         profile.end(&mut watched);
         assert_eq!((summary.ended, summary.ticks, summary.turns), (same.ended, same.ticks, same.turns));
         assert_eq!(alone.canary(), watched.canary());
@@ -230,8 +230,8 @@ mod tests {
             machine(Config::DEFAULT, Box::new(RealHost::new(Vec::new()))).expect("there is room");
         let mut profile = Profile::begin(&mut machine);
         let started = Instant::now();
-        let look = &mut |machine: &mut Vm| profile.look(machine);
-        run_in_portions(&mut machine, &program, INTERVAL, look).expect("it runs");
+        let sample = &mut |machine: &mut Vm| profile.sample(machine);
+        run_in_portions(&mut machine, &program, INTERVAL, sample).expect("it runs");
         profile.end(&mut machine);
         let taken = started.elapsed().as_nanos() as u64;
         let spin = profile.functions().into_iter().find(|function| function.name == "SPIN");

@@ -126,7 +126,7 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
     status
 }
 
-/// Ticks that background tasks run between two looks at what they have written.
+/// Ticks that background tasks run between two checks of their output.
 const BACKGROUND_TICKS: u64 = 100_000;
 
 /// A session: the machine, and the lines that are typed.

@@ -5,7 +5,7 @@ use std::time::{Duration, SystemTime};
 
 use esl_command as command;
 
-/// Time between two looks at the files.
+/// Time between two checks of the files.
 const PERIOD: Duration = Duration::from_millis(250);
 
 /// The sources in folders: names, times of their last changes, lengths.

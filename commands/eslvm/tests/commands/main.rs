@@ -12,6 +12,7 @@ mod browser;
 mod coverage;
 mod deadlock;
 mod documents;
+mod endings;
 mod examples;
 mod exploring;
 mod http;
@@ -55,7 +56,6 @@ mod testing;
 mod timeline;
 mod traces;
 #[cfg(unix)]
-mod ways_out;
 mod world;
 
 use std::process::Command;

@@ -157,7 +157,7 @@ fn a_session_of_an_operator_has_the_same_flags() {
 /// Whatever reaches outside asks for its right; the refusal has the right, the object, and the whole flag.
 #[cfg(unix)]
 #[test]
-fn every_way_out_of_the_program_needs_its_right() {
+fn every_access_to_the_outside_needs_its_right() {
     let rows = [
         (r#"(os:getenv "HOME")"#, ":ENV", "HOME"),
         (r#"(process:run-program '("ls" "-l"))"#, ":RUN", "ls"),

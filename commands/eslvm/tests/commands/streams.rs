@@ -196,7 +196,7 @@ fn a_fifo_that_nobody_reads_yet_delays_only_its_writer() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn no_way_out_leaves_a_descriptor() {
+fn no_ending_leaves_a_descriptor() {
     let text = "(defun descriptors () (length (directory \"/proc/self/fd/*\")))
 (defmacro cause (form) `(handler-case ,form (failure (f) (failure-cause f))))
 (with-open-file (s \"file\" :direction :output) (dotimes (i 20000) (format s \"line ~d~%\" i)))

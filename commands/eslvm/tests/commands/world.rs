@@ -260,7 +260,7 @@ fn functions_of_the_host_are_defined_by_their_rows() {
   (fault (sockets::%socket-port socket)))";
     let expected = [
         "\"Writes CONTENTS, a text or bytes, as far as the system takes them without delay. Returns NIL if that was \
-         all; otherwise T if the rest is kept, and 0 if somebody else writes.\"",
+         all; otherwise T if the rest is kept, and 0 if another task writes.\"",
         "\"Waits for data.\"",
         "(7 SOCKET)",
         "(-1 (INTEGER 0 18446744073709551615))",

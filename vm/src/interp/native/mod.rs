@@ -180,7 +180,7 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         base: 0,
         outer: 0,
         value: 0,
-        put_aside: [0; 4],
+        unspilled: [0; 4],
         doubles: [MaybeUninit::uninit(); 256],
         machine: (&raw mut caller).cast::<c_void>(),
         step: step::step,
@@ -274,14 +274,14 @@ unsafe fn is_as_said(vm: &Vm, context: &NativeContext) -> bool {
     }
 }
 
-/// Writes the words of the doubles that machine code has put aside.
+/// Spills the doubles that machine code has saved: writes their words to the stack.
 ///
 /// # Safety
 /// Machine code was left, or has called the machine.
 #[inline]
 unsafe fn make_words(context: &mut NativeContext) {
     let base: *mut Value = std::ptr::with_exposed_provenance_mut(context.outer as usize);
-    for (index, names) in context.put_aside.iter_mut().enumerate() {
+    for (index, names) in context.unspilled.iter_mut().enumerate() {
         while *names != 0 {
             let register = index * 64 + names.trailing_zeros() as usize;
             *names &= *names - 1;

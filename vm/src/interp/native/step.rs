@@ -2,7 +2,7 @@
 //! calls of builtins.
 //!
 //! All of it has the contract of a helper: machine code calls it at an instruction of the running frame, with
-//! the context of [`super::run`]. It does what the arm of the loop does behind the fast ways that machine
+//! the context of [`super::run`]. It does what the arm of the loop does behind the fast paths that machine
 //! code has, and asks for a safepoint where the arm does.
 
 use esl_bytecode::for_each_opcode;
@@ -21,7 +21,7 @@ use crate::vm::Vm;
 
 /// The outcome of an instruction that the machine has executed for machine code.
 enum Done {
-    /// The next one follows. What a fast way of the loop does asks for no safepoint.
+    /// The next one follows. A fast path of the loop requests no safepoint.
     Fast,
     /// The next one follows.
     Slow,
@@ -92,7 +92,7 @@ pub(super) unsafe fn attend(context: *mut NativeContext, vm: &mut Vm) {
     }
 }
 
-/// Does the instruction at `pc`: what its arm does behind the fast ways that machine code has.
+/// Does the instruction at `pc`: what its arm does behind the fast paths that machine code has.
 pub(super) unsafe extern "C" fn step(context: *mut NativeContext, pc: *const u32, base: *mut u64) -> u64 {
     // SAFETY: machine code calls this at an instruction of the frame at `base`.
     unsafe {

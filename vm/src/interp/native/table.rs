@@ -97,7 +97,7 @@ fn at_once(vm: &mut Vm, operation: LookupOperation, key: Value, table: Value, gi
     }
 }
 
-/// As [`at_once`], for keys of any kind: so the way of fixnums needs no memory.
+/// As [`at_once`], for keys of any kind: so the path for fixnums needs no memory.
 #[inline(never)]
 fn with_other_key(
     vm: &mut Vm,

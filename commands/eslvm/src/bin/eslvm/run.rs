@@ -126,9 +126,9 @@ pub(crate) fn run(
     let summary = match schedule {
         Some(schedule) => program::run_by(&mut machine, &program, &schedule.settings(), schedule.choices()),
         None => match &mut found {
-            Some(found) => {
-                program::run_in_portions(&mut machine, &program, INTERVAL, &mut |machine| found.look(machine))
-            }
+            Some(found) => program::run_in_portions(&mut machine, &program, INTERVAL, &mut |machine| {
+                found.sample(machine)
+            }),
             None => program::run_in(&mut machine, &program),
         },
     };

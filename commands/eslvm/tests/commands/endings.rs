@@ -84,7 +84,7 @@ fn every_signal_ends_a_run_with_its_cleanups_newest_first() {
 }
 
 #[test]
-fn every_other_way_out_ends_with_the_cleanups_too() {
+fn every_other_ending_runs_the_cleanups_too() {
     let ways = [
         ("(sleep 1)", &[][..]),
         ("(exit 9)", &[]),

@@ -1,7 +1,8 @@
-//! Doors: what senders outside know of the inputs of a machine, so that they can be refused or wait.
+//! Senders of signals from outside, and their admission: a signal is refused, or waits, while its input is
+//! full.
 //!
-//! The machine says here which inputs there are and how many signals they keep; it never reads what is here,
-//! so a run does not depend on it.
+//! The machine reports its inputs and the number of signals that they keep; it never reads the admission, so
+//! a run does not depend on it.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -39,7 +40,7 @@ impl std::error::Error for SendError {}
 
 /// The state of one input, as senders see it.
 #[derive(Debug, Default)]
-struct Door {
+struct InputAdmission {
     /// Number of signals for which there is room, if senders wait.
     capacity: Option<usize>,
     /// Signals that the input keeps.
@@ -49,61 +50,61 @@ struct Door {
 }
 
 #[derive(Default)]
-struct DoorTable {
-    doors: BTreeMap<String, Door>,
+struct AdmissionTable {
+    inputs: BTreeMap<String, InputAdmission>,
     /// Drivers that wait for room.
     wakers: Vec<Waker>,
     is_closed: bool,
 }
 
-/// How a driver sends a signal.
-pub(super) struct DoorEntry<'a> {
+/// The request of a driver to send a signal.
+pub(super) struct AdmissionRequest<'a> {
     /// Most signals that are on their way.
     pub(super) limit: Option<usize>,
     /// Woken when there may be room.
     pub(super) waker: Option<&'a Waker>,
 }
 
-impl DoorTable {
+impl AdmissionTable {
     /// Counts a signal that may be sent to the input.
-    fn enter(&mut self, name: &str, limit: Option<usize>) -> Result<(), SendError> {
+    fn admit(&mut self, name: &str, limit: Option<usize>) -> Result<(), SendError> {
         if self.is_closed {
             return Err(SendError::Ended);
         }
-        let Some(door) = self.doors.get_mut(name) else { return Err(SendError::NoSuchInput(name.into())) };
-        let has_room = door.capacity.is_none_or(|capacity| door.kept + door.sent < capacity);
-        if !has_room || limit.is_some_and(|limit| door.sent >= limit) {
+        let Some(input) = self.inputs.get_mut(name) else { return Err(SendError::NoSuchInput(name.into())) };
+        let has_room = input.capacity.is_none_or(|capacity| input.kept + input.sent < capacity);
+        if !has_room || limit.is_some_and(|limit| input.sent >= limit) {
             return Err(SendError::Full(name.into()));
         }
-        door.sent += 1;
+        input.sent += 1;
         Ok(())
     }
 }
 
-/// The doors of one machine.
+/// The admission of signals to one machine.
 #[derive(Default)]
-pub(super) struct Doors {
-    state: Mutex<DoorTable>,
-    /// Notified when there may be room, or the doors are closed.
+pub(super) struct Admission {
+    state: Mutex<AdmissionTable>,
+    /// Notified when there may be room, or the machine is gone.
     room: Condvar,
 }
 
-impl Doors {
-    fn state(&self) -> MutexGuard<'_, DoorTable> {
+impl Admission {
+    fn state(&self) -> MutexGuard<'_, AdmissionTable> {
         // The state is whole at every moment, so a panic elsewhere does not corrupt it.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn change(&self, name: &str, change: impl FnOnce(&mut Door)) {
+    fn change(&self, name: &str, change: impl FnOnce(&mut InputAdmission)) {
         self.change_table(|table| {
-            if let Some(door) = table.doors.get_mut(name) {
-                change(door);
+            if let Some(input) = table.inputs.get_mut(name) {
+                change(input);
             }
         });
     }
 
     /// Changes the table, and wakes all senders that wait for room.
-    fn change_table(&self, change: impl FnOnce(&mut DoorTable)) {
+    fn change_table(&self, change: impl FnOnce(&mut AdmissionTable)) {
         let wakers = {
             let mut table = self.state();
             change(&mut table);
@@ -114,31 +115,35 @@ impl Doors {
     }
 
     /// Waits until a signal may be sent to the input, if `waits`, and counts it.
-    fn enter(&self, name: &str, waits: bool) -> Result<(), SendError> {
+    fn admit(&self, name: &str, waits: bool) -> Result<(), SendError> {
         let mut table = self.state();
         loop {
-            match table.enter(name, None) {
+            match table.admit(name, None) {
                 Err(SendError::Full(_)) if waits => {
                     table = self.room.wait(table).unwrap_or_else(PoisonError::into_inner);
                 }
-                entered => return entered,
+                admitted => return admitted,
             }
         }
     }
 
-    /// As [`Doors::enter`], for a driver, which is woken when there may be room.
-    pub(super) fn poll_enter(&self, name: &str, entry: DoorEntry<'_>) -> Poll<Result<(), SendError>> {
+    /// As [`Admission::admit`], for a driver, which is woken when there may be room.
+    pub(super) fn poll_admit(
+        &self,
+        name: &str,
+        request: AdmissionRequest<'_>,
+    ) -> Poll<Result<(), SendError>> {
         let mut table = self.state();
-        match table.enter(name, entry.limit) {
+        match table.admit(name, request.limit) {
             Err(SendError::Full(_)) => {
-                if let Some(waker) = entry.waker
+                if let Some(waker) = request.waker
                     && !table.wakers.iter().any(|known| known.will_wake(waker))
                 {
                     table.wakers.push(waker.clone());
                 }
                 Poll::Pending
             }
-            entered => Poll::Ready(entered),
+            admitted => Poll::Ready(admitted),
         }
     }
 }
@@ -146,33 +151,33 @@ impl Doors {
 impl Inbox {
     /// Says that there is an input of this name; with a capacity, if senders wait when it is full.
     #[doc(hidden)]
-    pub fn open_door(&self, name: &str, capacity: Option<usize>) {
-        self.doors().state().doors.entry(name.into()).or_default().capacity = capacity;
-        self.doors().change(name, |_| {});
+    pub fn open_input(&self, name: &str, capacity: Option<usize>) {
+        self.admission().state().inputs.entry(name.into()).or_default().capacity = capacity;
+        self.admission().change(name, |_| {});
     }
 
     /// Says that the input is no more.
     #[doc(hidden)]
-    pub fn remove_door(&self, name: &str) {
-        self.doors().change_table(|table| _ = table.doors.remove(name));
+    pub fn remove_input(&self, name: &str) {
+        self.admission().change_table(|table| _ = table.inputs.remove(name));
     }
 
     /// Says that a signal that was sent to the input has come.
     #[doc(hidden)]
     pub fn note_arrival(&self, name: &str) {
-        self.doors().change(name, |door| door.sent = door.sent.saturating_sub(1));
+        self.admission().change(name, |input| input.sent = input.sent.saturating_sub(1));
     }
 
     /// Says how many signals the input keeps.
     #[doc(hidden)]
     pub fn note_kept(&self, name: &str, kept: usize) {
-        self.doors().change(name, |door| door.kept = kept);
+        self.admission().change(name, |input| input.kept = kept);
     }
 
     /// Says that the machine is gone.
     #[doc(hidden)]
-    pub fn close_doors(&self) {
-        self.doors().change_table(|table| table.is_closed = true);
+    pub fn close_inputs(&self) {
+        self.admission().change_table(|table| table.is_closed = true);
     }
 }
 
@@ -229,7 +234,7 @@ impl Sender {
 
     fn send(&self, input: &str, arguments: Vec<Datum>, waits: bool) -> Result<(), SendError> {
         let input = input.to_uppercase();
-        self.inbox().doors().enter(&input, waits)?;
+        self.inbox().admission().admit(&input, waits)?;
         self.inbox().put(Incoming::Message { input, arguments });
         Ok(())
     }
@@ -245,21 +250,21 @@ mod tests {
         let sender = Sender::new(&inbox);
         let outcome = |name: &str| sender.try_signal(name, Vec::new());
         assert_eq!(outcome("go"), Err(SendError::NoSuchInput("GO".into())));
-        inbox.open_door("GO", Some(1));
+        inbox.open_input("GO", Some(1));
         assert_eq!((outcome("go"), outcome("go")), (Ok(()), Err(SendError::Full("GO".into()))));
         inbox.note_arrival("GO");
         inbox.note_kept("GO", 1);
         assert_eq!(outcome("go"), Err(SendError::Full("GO".into())));
-        inbox.open_door("GO", None);
+        inbox.open_input("GO", None);
         assert_eq!(outcome("go"), Ok(()));
-        inbox.close_doors();
+        inbox.close_inputs();
         assert_eq!(outcome("go"), Err(SendError::Ended));
     }
 
     #[test]
     fn a_sender_waits_for_room() {
         let inbox = Inbox::new();
-        inbox.open_door("GO", Some(1));
+        inbox.open_input("GO", Some(1));
         let sender = Sender::new(&inbox);
         assert_eq!(sender.signal("go", Vec::new()), Ok(()));
         let other = sender.clone();
