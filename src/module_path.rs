@@ -27,6 +27,9 @@ use esl_compiler::similar::is_like;
 use esl_host::Rights;
 use esl_vm::load::LoadError;
 
+#[cfg(feature = "world")]
+pub use esl_world::add_modules;
+
 /// The environment variable that names further folders, separated as in `PATH`.
 pub const VARIABLE: &str = "ESL_LIBRARY";
 
@@ -53,6 +56,13 @@ pub enum ModuleError {
         /// Name of a module that may be meant.
         similar: Option<String>,
     },
+    /// The module belongs to a feature of the commands, which this program is built without.
+    NotBuilt {
+        /// Name of the module.
+        name: String,
+        /// Name of the feature.
+        feature: &'static str,
+    },
     /// The file cannot be read.
     Unreadable(PathBuf, std::io::Error),
     /// The file is not text in UTF-8.
@@ -74,6 +84,11 @@ impl fmt::Display for ModuleError {
                 write!(f, "`{name}.esl` is not in {}", folders.join(", "))?;
                 similar.as_ref().map_or(Ok(()), |similar| write!(f, "; did you mean `{similar}`?"))
             }
+            ModuleError::NotBuilt { name, feature } => write!(
+                f,
+                "`{name}` is a module of the feature `{feature}`, which this program is built without: \
+                 type `cargo build --release --features {feature}`"
+            ),
             ModuleError::Unreadable(path, error) => {
                 write!(f, "`{}` cannot be read: {error}", path.display())
             }
@@ -167,6 +182,10 @@ impl ModulePath {
             let name = format!("{MODULE_SOURCES}{}.esl", name.to_lowercase());
             return Ok(Required::Source { name, text: text.into() });
         }
+        #[cfg(feature = "world")]
+        if let Some(feature) = esl_world::feature_of_module(name) {
+            return Err(ModuleError::NotBuilt { name: name.to_lowercase(), feature });
+        }
         let similar = self.names().into_iter().find(|known| is_like(known, &name.to_lowercase()));
         Err(ModuleError::NotFound { name: name.into(), folders: self.folders.clone(), similar })
     }
@@ -230,5 +249,12 @@ mod tests {
         let error = path.find("jsno").expect_err("there is no such module").to_string();
         assert!(error.ends_with("; did you mean `json`?"), "{error}");
         assert!(!said("no-such-module").contains("did you mean"));
+    }
+
+    #[cfg(feature = "world")]
+    #[test]
+    fn a_module_of_a_feature_that_is_off_says_how_to_have_it() {
+        let error = ModulePath::none().find("ros").expect_err("no crate has added it").to_string();
+        assert!(error.contains("`robots`") && error.ends_with("--features robots`"), "{error}");
     }
 }

@@ -24,6 +24,7 @@ const FOLDERS: [&str; 22] = [
     "language-server",
     "operate",
     "replay",
+    "robots",
     "stdlib",
     "syntax",
     "testing",

@@ -41,7 +41,8 @@ mod watch;
 use esl_vm::vm::Vm;
 
 pub use event_loop::{NoEventLoop, spawn};
-pub use modules::{module, module_names};
+pub use modules::{add_modules, feature_of_module, module, module_names};
+pub use operation::{Cancelled, ready_soon, spawned, to_its_end};
 #[cfg(feature = "tls")]
 pub use tls::{PemFault, TlsError, TlsIdentity, begin_tls};
 

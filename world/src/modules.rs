@@ -1,4 +1,7 @@
-//! The modules: their texts, the functions of the host that they call, and how a machine finds both.
+//! The modules: their texts, the functions of the host that they call, and how a machine finds both. A program
+//! adds those of other crates.
+
+use std::sync::{PoisonError, RwLock};
 
 use esl_host::{HostModule, HostRows, Inbox, definitions};
 use esl_vm::vm::Vm;
@@ -33,8 +36,47 @@ const OF_THE_LIBRARY: &[fn(&Inbox) -> HostRows] = &[
     crate::watch::rows,
 ];
 
+/// The modules of other crates.
+static ADDED: RwLock<Vec<&'static HostModule>> = RwLock::new(Vec::new());
+
+/// Modules of crates that a program may lack, and the feature of the commands that adds them.
+const OPTIONAL: &[(&str, &str)] = &[("ros", "robots"), ("zenoh", "robots")];
+
+/// Adds modules of other crates for all machines that this process makes from now on, and for its compilations.
+/// A module in place of an earlier one of its name wins.
+///
+/// ```
+/// use esl_host::{HostModule, HostRows};
+///
+/// static MODULES: &[HostModule] = &[HostModule {
+///     name: "arm",
+///     text: "(defpackage :arm\n  (:use :esl))",
+///     rows: HostRows::new,
+/// }];
+/// esl_world::add_modules(MODULES);
+/// assert!(esl_world::module("ARM").is_some());
+/// ```
+pub fn add_modules(modules: &'static [HostModule]) {
+    let mut added = ADDED.write().unwrap_or_else(PoisonError::into_inner);
+    added.retain(|known| !modules.iter().any(|module| module.name == known.name));
+    added.extend(modules);
+}
+
+/// Returns all modules.
+fn modules() -> Vec<&'static HostModule> {
+    let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
+    let own = MODULES.iter().filter(|own| !added.iter().any(|module| module.name == own.name));
+    own.chain(added.iter().copied()).collect()
+}
+
 fn find(name: &str) -> Option<&'static HostModule> {
-    MODULES.iter().find(|module| module.name.eq_ignore_ascii_case(name))
+    modules().into_iter().find(|module| module.name.eq_ignore_ascii_case(name))
+}
+
+/// Returns the feature of the commands that adds the module of this name, in any case, if this process lacks it.
+pub fn feature_of_module(name: &str) -> Option<&'static str> {
+    let (_, feature) = OPTIONAL.iter().find(|(known, _)| known.eq_ignore_ascii_case(name))?;
+    find(name).is_none().then_some(feature)
 }
 
 /// Returns the text of the module of this name, in any case.
@@ -44,7 +86,7 @@ pub fn module(name: &str) -> Option<&'static str> {
 
 /// Returns the names of the modules.
 pub fn module_names() -> impl Iterator<Item = &'static str> {
-    MODULES.iter().map(|module| module.name)
+    modules().into_iter().map(|module| module.name)
 }
 
 /// Has `require` find the modules when the program runs, and their texts find the functions that they call.
@@ -55,6 +97,12 @@ pub(crate) fn install(machine: &mut Vm) {
     rows.at_once("%MODULE-TEXT", ["name"], "Returns the text of a module, or NIL.", |name: String| {
         Ok(module(&name))
     });
+    rows.at_once(
+        "%FEATURE-OF-MODULE",
+        ["name"],
+        "Returns the feature of the commands that adds a module that is missing, or NIL.",
+        |name: String| Ok(feature_of_module(&name)),
+    );
     let for_definitions = inbox.clone();
     rows.at_once(
         "%HOST-FUNCTIONS",
@@ -79,7 +127,7 @@ pub(crate) fn install_operations(machine: &mut Vm) {
 
 /// Returns the functions of all modules and of the library.
 fn all_rows(inbox: &Inbox) -> impl Iterator<Item = esl_host::HostRow> {
-    let makers = OF_THE_LIBRARY.iter().copied().chain(MODULES.iter().map(|module| module.rows));
+    let makers = OF_THE_LIBRARY.iter().copied().chain(modules().into_iter().map(|module| module.rows));
     makers.flat_map(move |rows| rows(inbox))
 }
 
@@ -94,6 +142,27 @@ mod tests {
             assert!(module(&name.to_uppercase()).is_some());
         }
         assert!(module("none").is_none());
+    }
+
+    #[test]
+    fn modules_of_other_crates_are_found_and_replace_earlier_ones() {
+        static FIRST: &[HostModule] = &[
+            HostModule { name: "gripper", text: "first", rows: none },
+            HostModule { name: "wheel", text: "wheel", rows: none },
+        ];
+        static SECOND: &[HostModule] = &[HostModule { name: "gripper", text: "second", rows: none }];
+        assert_eq!(module("gripper"), None);
+        add_modules(FIRST);
+        add_modules(SECOND);
+        assert_eq!((module("gripper"), module("Wheel")), (Some("second"), Some("wheel")));
+        assert_eq!(module_names().filter(|name| *name == "gripper").count(), 1);
+        assert!(module("json").is_some());
+    }
+
+    #[test]
+    fn a_missing_module_of_a_feature_names_the_feature() {
+        assert_eq!((feature_of_module("ROS"), feature_of_module("json")), (Some("robots"), None));
+        assert_eq!(feature_of_module("no-such-module"), None);
     }
 
     #[test]

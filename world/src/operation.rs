@@ -10,11 +10,11 @@ use tokio::sync::oneshot;
 use crate::event_loop::{self, Stoppable};
 
 /// Tells a function that the program has cancelled its operation.
-pub(crate) struct Cancelled(oneshot::Receiver<()>);
+pub struct Cancelled(oneshot::Receiver<()>);
 
 impl Cancelled {
     /// Waits until the operation is cancelled: for ever, if that does not happen.
-    pub(crate) async fn wait(&mut self) {
+    pub async fn wait(&mut self) {
         if (&mut self.0).await.is_err() {
             // It cannot be cancelled any more.
             std::future::pending::<()>().await;
@@ -36,7 +36,7 @@ impl FromCall for Cancelled {
 }
 
 /// Begins an operation as a task of the event loop. A call that is left drops the future, and is over then.
-pub(crate) fn spawned(operation: HostOperation, future: OperationFuture) {
+pub fn spawned(operation: HostOperation, future: OperationFuture) {
     let (cancel, cancelled) = oneshot::channel();
     operation.on_cancel(move || _ = cancel.send(()));
     let begun = BegunOperation::new(future, operation);
@@ -47,13 +47,13 @@ pub(crate) fn spawned(operation: HostOperation, future: OperationFuture) {
 /// As [`spawned`], of an operation that is often over at once, and no part of which the system may delay. It
 /// is begun by the thread of the machine, and goes on in the one that has what it waits for, so that neither
 /// takes a way through another thread.
-pub(crate) fn ready_soon(operation: HostOperation, future: OperationFuture) {
+pub fn ready_soon(operation: HostOperation, future: OperationFuture) {
     // As above.
     _ = event_loop::begin(BegunOperation::new(future, operation));
 }
 
 /// Begins an operation that itself sees to its end when it is cancelled: its code takes [`Cancelled`].
-pub(crate) fn to_its_end(operation: HostOperation, future: OperationFuture) {
+pub fn to_its_end(operation: HostOperation, future: OperationFuture) {
     // As above.
     _ = event_loop::spawn(BegunOperation::new(future, operation));
 }

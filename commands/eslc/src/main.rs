@@ -190,6 +190,7 @@ const HABITS: command::Habits = &[
 ];
 
 fn main() -> ExitCode {
+    command::add_modules();
     let status = match command::parse::<Eslc>("eslc check", HABITS).action {
         EslcAction::Compile { files, output: Some(output), compiling } => {
             compile(&files, &output, Modules::Inside, &compiling)

@@ -50,6 +50,12 @@ pub const NOT_PROVED: u8 = 7;
 /// Exit status of a run that a signal has ended, less the number of the signal, as shells report it.
 pub const SIGNALLED: u8 = Ended::SIGNALLED;
 
+/// Adds the modules of the features that the command is built with. To be called before anything is compiled.
+pub fn add_modules() {
+    #[cfg(feature = "robots")]
+    esl_world::add_modules(esl_robots::MODULES);
+}
+
 /// Returns the name of the running command, for messages.
 fn command_name() -> String {
     let path = std::env::args_os().next().unwrap_or_default();

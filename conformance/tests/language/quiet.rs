@@ -49,6 +49,7 @@ fn files(folder: &str, extension: &str) -> Vec<PathBuf> {
 /// Compiles a text that stands in `path`; returns what is reported and not meant.
 fn findings(path: &Path, text: String) -> Vec<String> {
     let name = path.strip_prefix(root()).unwrap_or(path).display().to_string();
+    esl_world::add_modules(esl_robots::MODULES);
     let modules = ModulePath::new([path], &[]);
     let compiled = program::compile_with(&[Source::new(name.clone(), text)], &modules, Modules::Inside);
     let mut meant: Vec<(&str, usize)> =
@@ -70,7 +71,8 @@ fn findings(path: &Path, text: String) -> Vec<String> {
 
 #[test]
 fn examples_and_modules_have_no_warnings() {
-    let paths = [files("examples", "esl"), files("world/modules", "esl")].concat();
+    let folders = ["examples", "world/modules"];
+    let paths = folders.map(|folder| files(folder, "esl")).concat();
     assert!(paths.len() > 25, "{} files", paths.len());
     let read = |path: &PathBuf| std::fs::read_to_string(path).expect("the file is text");
     let found: Vec<String> = paths.iter().flat_map(|path| findings(path, read(path))).collect();

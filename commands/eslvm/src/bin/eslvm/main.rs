@@ -55,6 +55,7 @@ fn main() -> ExitCode {
     #[cfg(unix)]
     raise_limit_of_descriptors();
     esl_vm::allocator::return_large_blocks();
+    command::add_modules();
     let status = match command::parse::<Eslvm>("eslvm run", HABITS).action {
         EslvmAction::Run {
             mut options,

@@ -1,0 +1,1 @@
+//! Messages of ROS 2 whose types are known at run time only.
