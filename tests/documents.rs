@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Folders of documents; `docs` and `examples` with all that is below them.
-const FOLDERS: [&str; 22] = [
+const FOLDERS: [&str; 23] = [
     "",
     "benches",
     "bytecode",
