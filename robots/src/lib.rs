@@ -1,4 +1,4 @@
-//! What robots speak, for programs in ESL: modules over Zenoh, and messages of ROS 2.
+//! Modules for programs that talk to robots: over Zenoh, with messages of ROS 2.
 //!
 //! ```
 //! esl_world::add_modules(esl_robots::MODULES);

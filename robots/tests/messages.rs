@@ -11,7 +11,7 @@ use std::sync::Arc;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::packed::PackedVector;
 use esl_bytecode::span::Span;
-use esl_robots::message::{Element, Extent, MessageType, Scalar, Types, decode, encode};
+use esl_robots::message::{Element, FieldExtent, MessageType, Scalar, Types, decode, encode};
 
 /// Random messages, both ways.
 const MESSAGES: usize = 10_000;
@@ -144,9 +144,9 @@ impl Random {
         for field in message_type.fields() {
             let most = if depth < 3 { [0, 1, 2, 5][self.below(4)] } else { 1 };
             let value = match field.extent {
-                Extent::One => self.element(&field.element, depth),
-                Extent::Fixed(count) => self.array(&field.element, count, depth),
-                Extent::Sequence(bound) => {
+                FieldExtent::One => self.element(&field.element, depth),
+                FieldExtent::Fixed(count) => self.array(&field.element, count, depth),
+                FieldExtent::Sequence(bound) => {
                     let count = self.below(bound.unwrap_or(most).min(most) + 1);
                     self.array(&field.element, count, depth)
                 }
@@ -202,7 +202,7 @@ fn write_message(out: &mut String, message_type: &MessageType, message: &Datum) 
         if index > 0 {
             out.push(' ');
         }
-        if field.extent == Extent::One {
+        if field.extent == FieldExtent::One {
             write_element(out, &field.element, value);
             continue;
         }

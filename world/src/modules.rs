@@ -1,5 +1,5 @@
-//! The modules: their texts, the functions of the host that they call, and how a machine finds both. A program
-//! adds those of other crates.
+//! The modules: their texts, the functions of the host that they call, and how a machine finds both. A
+//! program adds those of other crates.
 
 use std::sync::{PoisonError, RwLock};
 
@@ -42,8 +42,8 @@ static ADDED: RwLock<Vec<&'static HostModule>> = RwLock::new(Vec::new());
 /// Modules of crates that a program may lack, and the feature of the commands that adds them.
 const OPTIONAL: &[(&str, &str)] = &[("ros", "robots"), ("zenoh", "robots")];
 
-/// Adds modules of other crates for all machines that this process makes from now on, and for its compilations.
-/// A module in place of an earlier one of its name wins.
+/// Adds modules of other crates for all machines that this process makes from now on, and for its
+/// compilations. A module in place of an earlier one of its name wins.
 ///
 /// ```
 /// use esl_host::{HostModule, HostRows};
@@ -73,7 +73,8 @@ fn find(name: &str) -> Option<&'static HostModule> {
     modules().into_iter().find(|module| module.name.eq_ignore_ascii_case(name))
 }
 
-/// Returns the feature of the commands that adds the module of this name, in any case, if this process lacks it.
+/// Returns the feature of the commands that adds the module of this name, in any case, if this process lacks
+/// it.
 pub fn feature_of_module(name: &str) -> Option<&'static str> {
     let (_, feature) = OPTIONAL.iter().find(|(known, _)| known.eq_ignore_ascii_case(name))?;
     find(name).is_none().then_some(feature)

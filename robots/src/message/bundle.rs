@@ -1,4 +1,5 @@
-//! The definitions that come with ESL: the common interfaces of ROS 2, which the build step packs into one text.
+//! The definitions that come with ESL: the common interfaces of ROS 2, packed into one text by the build
+//! step.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;

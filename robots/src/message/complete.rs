@@ -9,12 +9,10 @@ use esl_bytecode::span::Span;
 use num_bigint::BigInt;
 use num_traits::ToPrimitive;
 
-use super::definition::Extent;
-use super::fault::{MessageFault, Problem, Step};
-use super::message_type::{Element, Field, MessageType};
+use super::definition::FieldExtent;
+use super::fault::{FieldStep, MessageFault, MessageProblem, MessageResult};
+use super::message_type::{Element, MessageField, MessageType};
 use super::scalar::{Scalar, boolean, float, vector};
-
-type Outcome<T> = Result<T, MessageFault>;
 
 /// Returns a message with all its fields: those that are not given have their defaults.
 ///
@@ -23,21 +21,21 @@ type Outcome<T> = Result<T, MessageFault>;
 ///
 /// # Errors
 /// The first field that is unknown, given twice, or of a wrong type, with its path.
-pub fn complete(message_type: &MessageType, message: &Datum) -> Outcome<Datum> {
+pub fn complete(message_type: &MessageType, message: &Datum) -> MessageResult<Datum> {
     complete_message(message_type, message).map_err(|fault| fault.of(message_type.name()))
 }
 
 /// Returns the default of a field without one in its definition.
-pub(super) fn default_of(element: &Element, extent: Extent) -> Datum {
+pub(super) fn default_of(element: &Element, extent: FieldExtent) -> Datum {
     let single = match element {
         Element::Scalar(scalar) => scalar.zero(),
         Element::Text { .. } => Datum::string("", Span::default()),
         Element::Message(message) => message.defaults(),
     };
     match extent {
-        Extent::One => single,
-        Extent::Fixed(count) => array_of(element, vec![single; count]),
-        Extent::Sequence(_) => array_of(element, Vec::new()),
+        FieldExtent::One => single,
+        FieldExtent::Fixed(count) => array_of(element, vec![single; count]),
+        FieldExtent::Sequence(_) => array_of(element, Vec::new()),
     }
 }
 
@@ -60,7 +58,7 @@ where
     })
 }
 
-fn complete_message(message_type: &MessageType, message: &Datum) -> Outcome<Datum> {
+fn complete_message(message_type: &MessageType, message: &Datum) -> MessageResult<Datum> {
     if message.is_nil() {
         return Ok(message_type.defaults());
     }
@@ -81,7 +79,7 @@ fn complete_message(message_type: &MessageType, message: &Datum) -> Outcome<Datu
         let Some(index) = index else { return Err(unknown_field(message_type, message, key)) };
         let field = &fields[index];
         if given[index].is_some() {
-            return Err(MessageFault::new(Problem::Twice(lower(key))));
+            return Err(MessageFault::new(MessageProblem::Twice(lower(key))));
         }
         let value = complete_field(message_type, field, value).map_err(|fault| fault.inside(step(field)))?;
         given[index] = Some(value);
@@ -101,9 +99,9 @@ fn complete_message(message_type: &MessageType, message: &Datum) -> Outcome<Datu
 }
 
 /// Returns the place of the field that a keyword names. Fields are mostly given in their order.
-fn place_of(fields: &[Field], key: &Datum, expected: usize) -> Option<usize> {
+fn place_of(fields: &[MessageField], key: &Datum, expected: usize) -> Option<usize> {
     let key = key.as_symbol().filter(|key| key.is_keyword())?;
-    let is_it = |field: &Field| field.keyword.as_symbol() == Some(key);
+    let is_it = |field: &MessageField| field.keyword.as_symbol() == Some(key);
     match fields.get(expected) {
         Some(field) if is_it(field) => Some(expected),
         _ => fields.iter().position(is_it),
@@ -111,8 +109,8 @@ fn place_of(fields: &[Field], key: &Datum, expected: usize) -> Option<usize> {
 }
 
 /// Returns the step into a field.
-pub(super) fn step(field: &Field) -> Step {
-    Step::Field(field.keyword.as_symbol().map_or_else(String::new, |symbol| symbol.name().to_owned()))
+pub(super) fn step(field: &MessageField) -> FieldStep {
+    FieldStep::Field(field.keyword.as_symbol().map_or_else(String::new, |symbol| symbol.name().to_owned()))
 }
 
 fn lower(datum: &Datum) -> String {
@@ -131,7 +129,7 @@ fn unknown_field(message_type: &MessageType, message: &Datum, key: &Datum) -> Me
     let given = lower(key);
     let names = message_type.fields.iter().map(|field| lower(&field.keyword));
     let nearest = nearest(&given, names);
-    MessageFault::new(Problem::UnknownField { given, of: message_type.name().to_owned(), nearest })
+    MessageFault::new(MessageProblem::UnknownField { given, of: message_type.name().to_owned(), nearest })
 }
 
 /// Returns the name that is most similar to a given one, if any is similar.
@@ -148,11 +146,11 @@ fn wrong_type(expected: &str, given: &Datum) -> MessageFault {
     if text.chars().count() > SHOWN {
         text = text.chars().take(SHOWN).collect::<String>() + "…";
     }
-    MessageFault::new(Problem::WrongType { expected: expected.to_owned(), given: text })
+    MessageFault::new(MessageProblem::WrongType { expected: expected.to_owned(), given: text })
 }
 
-fn complete_field(of: &MessageType, field: &Field, value: &Datum) -> Outcome<Datum> {
-    if field.extent == Extent::One {
+fn complete_field(of: &MessageType, field: &MessageField, value: &Datum) -> MessageResult<Datum> {
+    if field.extent == FieldExtent::One {
         return complete_element(of, &field.element, value);
     }
     let count = match value.kind() {
@@ -169,9 +167,9 @@ fn complete_field(of: &MessageType, field: &Field, value: &Datum) -> Outcome<Dat
         return Ok(same);
     }
     let complete = |(index, item): (usize, &Datum)| {
-        complete_element(of, &field.element, item).map_err(|fault| fault.inside(Step::Index(index)))
+        complete_element(of, &field.element, item).map_err(|fault| fault.inside(FieldStep::Index(index)))
     };
-    let items: Outcome<Vec<Datum>> = match value.kind() {
+    let items: MessageResult<Vec<Datum>> = match value.kind() {
         DatumKind::Vector(items) => items.iter().enumerate().map(complete).collect(),
         DatumKind::Packed(packed) => unpacked(packed).iter().enumerate().map(complete).collect(),
         _ => {
@@ -187,13 +185,13 @@ fn complete_field(of: &MessageType, field: &Field, value: &Datum) -> Outcome<Dat
 }
 
 /// Checks the number of elements of an array.
-pub(super) fn check_length(extent: Extent, given: usize) -> Outcome<()> {
+pub(super) fn check_length(extent: FieldExtent, given: usize) -> MessageResult<()> {
     let expected = match extent {
-        Extent::Fixed(count) if given != count => format!("{count} elements"),
-        Extent::Sequence(Some(most)) if given > most => format!("at most {most} elements"),
+        FieldExtent::Fixed(count) if given != count => format!("{count} elements"),
+        FieldExtent::Sequence(Some(most)) if given > most => format!("at most {most} elements"),
         _ => return Ok(()),
     };
-    Err(MessageFault::new(Problem::Length { expected, given }))
+    Err(MessageFault::new(MessageProblem::Length { expected, given }))
 }
 
 /// Returns a packed vector as an array of the type, if it is one without a look at each element as a datum.
@@ -230,7 +228,7 @@ fn unpacked(packed: &PackedVector) -> Vec<Datum> {
     }
 }
 
-fn complete_element(of: &MessageType, element: &Element, value: &Datum) -> Outcome<Datum> {
+fn complete_element(of: &MessageType, element: &Element, value: &Datum) -> MessageResult<Datum> {
     match element {
         Element::Message(message) => complete_message(message, value),
         Element::Scalar(Scalar::Bool) => match value.kind() {
@@ -254,7 +252,7 @@ fn complete_element(of: &MessageType, element: &Element, value: &Datum) -> Outco
                     Some(most) if length > *most => {
                         let unit = if *is_wide { "code units" } else { "bytes" };
                         let expected = format!("at most {most} {unit}");
-                        Err(MessageFault::new(Problem::Length { expected, given: length }))
+                        Err(MessageFault::new(MessageProblem::Length { expected, given: length }))
                     }
                     _ => Ok(value.clone()),
                 }
@@ -265,7 +263,7 @@ fn complete_element(of: &MessageType, element: &Element, value: &Datum) -> Outco
 }
 
 /// Returns a number of the type; `None` if the value is not one.
-fn complete_number(scalar: Scalar, value: &Datum) -> Option<Outcome<Datum>> {
+fn complete_number(scalar: Scalar, value: &Datum) -> Option<MessageResult<Datum>> {
     if scalar.is_float() {
         let number = match value.kind() {
             DatumKind::Float(number) => *number,
@@ -290,7 +288,7 @@ fn quotient(numerator: &BigInt, denominator: &BigInt) -> Option<f64> {
 }
 
 /// Returns the constant that a keyword names.
-fn constant_or(of: &MessageType, element: &Element, value: &Datum, expected: &str) -> Outcome<Datum> {
+fn constant_or(of: &MessageType, element: &Element, value: &Datum, expected: &str) -> MessageResult<Datum> {
     let Some(key) = value.as_symbol().filter(|key| key.is_keyword()) else {
         return Err(wrong_type(expected, value));
     };
@@ -312,7 +310,7 @@ fn constant_or(of: &MessageType, element: &Element, value: &Datum, expected: &st
     let names = of.constants.iter().filter(|constant| fits(&constant.value));
     let nearest =
         nearest(&given, names.map(|c| format!(":{}", c.name.replace('_', "-").to_ascii_lowercase())));
-    Err(MessageFault::new(Problem::UnknownConstant { given, of: of.name().to_owned(), nearest }))
+    Err(MessageFault::new(MessageProblem::UnknownConstant { given, of: of.name().to_owned(), nearest }))
 }
 
 /// Returns a number of seconds as a time, if it is a number; the inner `None` if it is out of range.

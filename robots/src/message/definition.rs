@@ -1,9 +1,8 @@
 //! The text of a definition, as `.msg` files have it, as data.
 //!
 //! Guarantees: any text is parsed or refused with its line; no value is accepted that its type does not have.
-//! Not here: the types that fields name (`types`).
-//! Source: the grammar of `rosidl_adapter`. `hiroz-codegen` has a parser too, which omits malformed constants,
-//! cuts texts at `#` and panics on a single quote.
+//! Not here: the types that fields name (`types`). Source: the grammar of `rosidl_adapter`. `hiroz-codegen`
+//! has a parser too, which omits malformed constants, cuts texts at `#` and panics on a single quote.
 
 use std::collections::HashSet;
 
@@ -33,7 +32,7 @@ pub(super) enum ElementName {
 
 /// The number of elements of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
+pub enum FieldExtent {
     /// It is not an array.
     One,
     /// An array of fixed length.
@@ -48,13 +47,13 @@ pub(super) struct FieldDefinition {
     pub(super) line: usize,
     pub(super) name: String,
     pub(super) element: ElementName,
-    pub(super) extent: Extent,
+    pub(super) extent: FieldExtent,
     pub(super) default: Option<Datum>,
 }
 
 /// A constant of a message type.
 #[derive(Clone, Debug)]
-pub struct Constant {
+pub struct MessageConstant {
     /// Its name in the definition.
     pub name: String,
     /// Its value.
@@ -63,18 +62,19 @@ pub struct Constant {
 
 /// The contents of a definition.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Definition {
+pub(super) struct MessageDefinition {
     pub(super) fields: Vec<FieldDefinition>,
-    pub(super) constants: Vec<Constant>,
+    pub(super) constants: Vec<MessageConstant>,
 }
 
-type Outcome<T> = Result<T, DefinitionProblem>;
+/// A part of a definition, or its fault.
+type ParsedPart<T> = Result<T, DefinitionProblem>;
 
-impl Definition {
+impl MessageDefinition {
     /// Returns the definition that a text denotes, whose first line has the number `first` + 1; a fault comes
     /// with the number of its line.
-    pub(super) fn parse(text: &str, first: usize) -> Result<Definition, (usize, DefinitionProblem)> {
-        let mut definition = Definition::default();
+    pub(super) fn parse(text: &str, first: usize) -> Result<MessageDefinition, (usize, DefinitionProblem)> {
+        let mut definition = MessageDefinition::default();
         let mut names = HashSet::new();
         for (index, line) in text.lines().enumerate() {
             let number = first + index + 1;
@@ -83,7 +83,7 @@ impl Definition {
         Ok(definition)
     }
 
-    fn add_line(&mut self, line: &str, number: usize, names: &mut HashSet<String>) -> Outcome<()> {
+    fn add_line(&mut self, line: &str, number: usize, names: &mut HashSet<String>) -> ParsedPart<()> {
         if line.is_empty() || line.starts_with('#') {
             return Ok(());
         }
@@ -108,7 +108,7 @@ impl Definition {
         }
         if let Some(text) = rest.strip_prefix('=') {
             let value = constant_value(&element, extent, text.trim())?;
-            self.constants.push(Constant { name: name.to_owned(), value });
+            self.constants.push(MessageConstant { name: name.to_owned(), value });
             return Ok(());
         }
         let default = match without_comment(rest) {
@@ -136,25 +136,25 @@ fn shortened(text: &str) -> String {
     }
 }
 
-fn parse_type(text: &str) -> Outcome<(ElementName, Extent)> {
+fn parse_type(text: &str) -> ParsedPart<(ElementName, FieldExtent)> {
     let wrong = || DefinitionProblem::Type(shortened(text));
     let number = |digits: &str| match digits.bytes().all(|b| b.is_ascii_digit()) {
         true => digits.parse::<u32>().map(|n| n as usize).map_err(|_| wrong()),
         false => Err(wrong()),
     };
     let (element, extent) = match text.split_once('[') {
-        None => (text, Extent::One),
+        None => (text, FieldExtent::One),
         Some((element, extent)) => {
             let extent = extent.strip_suffix(']').ok_or_else(wrong)?;
             let extent = match extent.strip_prefix("<=") {
-                Some(most) => Extent::Sequence(Some(number(most)?)),
-                None if extent.is_empty() => Extent::Sequence(None),
-                None => Extent::Fixed(number(extent)?),
+                Some(most) => FieldExtent::Sequence(Some(number(most)?)),
+                None if extent.is_empty() => FieldExtent::Sequence(None),
+                None => FieldExtent::Fixed(number(extent)?),
             };
             (element, extent)
         }
     };
-    if matches!(extent, Extent::Fixed(0) | Extent::Sequence(Some(0))) {
+    if matches!(extent, FieldExtent::Fixed(0) | FieldExtent::Sequence(Some(0))) {
         return Err(wrong());
     }
     let (base, most) = match element.split_once("<=") {
@@ -208,30 +208,34 @@ fn without_comment(text: &str) -> &str {
     }
 }
 
-fn constant_value(element: &ElementName, extent: Extent, text: &str) -> Outcome<Datum> {
+fn constant_value(element: &ElementName, extent: FieldExtent, text: &str) -> ParsedPart<Datum> {
     let text = without_comment(text);
     match (element, extent) {
-        (_, Extent::Fixed(_) | Extent::Sequence(_)) => Err(DefinitionProblem::NoValue("an array".into())),
+        (_, FieldExtent::Fixed(_) | FieldExtent::Sequence(_)) => {
+            Err(DefinitionProblem::NoValue("an array".into()))
+        }
         (ElementName::Message { .. }, _) => Err(DefinitionProblem::NoValue("a message".into())),
         _ => single_value(element, text),
     }
 }
 
-fn default_value(element: &ElementName, extent: Extent, text: &str) -> Outcome<Datum> {
+fn default_value(element: &ElementName, extent: FieldExtent, text: &str) -> ParsedPart<Datum> {
     if matches!(element, ElementName::Message { .. }) {
         return Err(DefinitionProblem::NoValue("a message".into()));
     }
     let wrong = |expected: String| DefinitionProblem::Value { text: shortened(text), expected };
-    if extent == Extent::One {
+    if extent == FieldExtent::One {
         return single_value(element, text);
     }
     let inner = text.strip_prefix('[').and_then(|text| text.strip_suffix(']'));
     let inner = inner.ok_or_else(|| wrong("an array, as in `[1, 2]`".into()))?;
     let items = split_items(inner).into_iter().map(|item| single_value(element, item));
-    let items = items.collect::<Outcome<Vec<Datum>>>()?;
+    let items = items.collect::<ParsedPart<Vec<Datum>>>()?;
     match extent {
-        Extent::Fixed(count) if items.len() != count => Err(wrong(format!("an array of {count} elements"))),
-        Extent::Sequence(Some(most)) if items.len() > most => {
+        FieldExtent::Fixed(count) if items.len() != count => {
+            Err(wrong(format!("an array of {count} elements")))
+        }
+        FieldExtent::Sequence(Some(most)) if items.len() > most => {
             Err(wrong(format!("a sequence of at most {most} elements")))
         }
         _ => Ok(match element {
@@ -265,7 +269,7 @@ fn split_items(text: &str) -> Vec<&str> {
     items
 }
 
-fn single_value(element: &ElementName, text: &str) -> Outcome<Datum> {
+fn single_value(element: &ElementName, text: &str) -> ParsedPart<Datum> {
     let wrong =
         |expected: &str| DefinitionProblem::Value { text: shortened(text), expected: expected.to_owned() };
     match element {
@@ -333,7 +337,7 @@ mod tests {
     use super::*;
 
     fn shown(text: &str) -> String {
-        match Definition::parse(text, 0) {
+        match MessageDefinition::parse(text, 0) {
             Err((line, problem)) => format!("{line}: {problem}"),
             Ok(definition) => {
                 let fields = definition.fields.iter().map(|field| {

@@ -8,11 +8,11 @@ use hiroz_schema::{
     FieldDescription, FieldTypeDescription, TypeDescription, TypeDescriptionMsg, TypeId, calculate_hash,
 };
 
-use super::definition::Extent;
-use super::message_type::{Element, Field, MessageType};
+use super::definition::FieldExtent;
+use super::message_type::{Element, MessageField, MessageType};
 
 /// Returns the description of a type, without those of its parts.
-pub(super) fn individual(name: &str, fields: &[Field]) -> TypeDescription {
+pub(super) fn individual(name: &str, fields: &[MessageField]) -> TypeDescription {
     let mut described: Vec<FieldDescription> = fields.iter().map(field).collect();
     if described.is_empty() {
         // A structure of IDL has a member, and a message without fields one of this name.
@@ -22,7 +22,7 @@ pub(super) fn individual(name: &str, fields: &[Field]) -> TypeDescription {
     TypeDescription { type_name: name.to_owned(), fields: described }
 }
 
-fn field(field: &Field) -> FieldDescription {
+fn field(field: &MessageField) -> FieldDescription {
     let (type_id, string_capacity, nested) = match &field.element {
         Element::Scalar(scalar) => (scalar.type_id(), 0, String::new()),
         Element::Text { is_wide, most } => {
@@ -37,10 +37,10 @@ fn field(field: &Field) -> FieldDescription {
         Element::Message(message) => (TypeId::NESTED_TYPE, 0, message.name().to_owned()),
     };
     let (offset, capacity) = match field.extent {
-        Extent::One => (0, 0),
-        Extent::Fixed(count) => (TypeId::ARRAY_OFFSET, count),
-        Extent::Sequence(Some(most)) => (TypeId::BOUNDED_SEQUENCE_OFFSET, most),
-        Extent::Sequence(None) => (TypeId::UNBOUNDED_SEQUENCE_OFFSET, 0),
+        FieldExtent::One => (0, 0),
+        FieldExtent::Fixed(count) => (TypeId::ARRAY_OFFSET, count),
+        FieldExtent::Sequence(Some(most)) => (TypeId::BOUNDED_SEQUENCE_OFFSET, most),
+        FieldExtent::Sequence(None) => (TypeId::UNBOUNDED_SEQUENCE_OFFSET, 0),
     };
     let field_type = FieldTypeDescription {
         type_id: type_id + offset,

@@ -149,13 +149,13 @@ pub struct MessageFault(Box<FaultAt>);
 struct FaultAt {
     type_name: String,
     /// The steps to the value, the innermost first.
-    path: Vec<Step>,
-    problem: Problem,
+    path: Vec<FieldStep>,
+    problem: MessageProblem,
 }
 
 /// A step from a value to a part of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Step {
+pub(super) enum FieldStep {
     /// The field of this keyword, in upper case.
     Field(String),
     /// The element of this index.
@@ -164,7 +164,7 @@ pub(super) enum Step {
 
 /// A fault of a value.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Problem {
+pub enum MessageProblem {
     /// The value is of another type.
     WrongType {
         /// The expected type, in words.
@@ -220,13 +220,19 @@ pub enum Problem {
     Parts(usize),
 }
 
+/// A value, or the fault of a message.
+pub(super) type MessageResult<T> = Result<T, MessageFault>;
+
+/// A value, or the fault of a type.
+pub(super) type TypeResult<T> = Result<T, TypeFault>;
+
 impl MessageFault {
-    pub(super) fn new(problem: Problem) -> MessageFault {
+    pub(super) fn new(problem: MessageProblem) -> MessageFault {
         MessageFault(Box::new(FaultAt { type_name: String::new(), path: Vec::new(), problem }))
     }
 
     /// Returns the fault as one of the value that this step leads from.
-    pub(super) fn inside(mut self, step: Step) -> MessageFault {
+    pub(super) fn inside(mut self, step: FieldStep) -> MessageFault {
         self.0.path.push(step);
         self
     }
@@ -238,15 +244,15 @@ impl MessageFault {
     }
 
     /// Returns the fault itself.
-    pub fn problem(&self) -> &Problem {
+    pub fn problem(&self) -> &MessageProblem {
         &self.0.problem
     }
 
     /// Returns the place of the value in the message, as `:poses 3 :position`; empty for the message itself.
     pub fn path(&self) -> String {
-        let step = |step: &Step| match step {
-            Step::Field(name) => format!(":{}", name.to_ascii_lowercase()),
-            Step::Index(index) => index.to_string(),
+        let step = |step: &FieldStep| match step {
+            FieldStep::Field(name) => format!(":{}", name.to_ascii_lowercase()),
+            FieldStep::Index(index) => index.to_string(),
         };
         self.0.path.iter().rev().map(step).collect::<Vec<_>>().join(" ")
     }
@@ -267,29 +273,29 @@ fn guess(f: &mut fmt::Formatter<'_>, nearest: Option<&String>) -> fmt::Result {
     nearest.map_or(Ok(()), |nearest| write!(f, "; did you mean `{nearest}`?"))
 }
 
-impl fmt::Display for Problem {
+impl fmt::Display for MessageProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Problem::WrongType { expected, given } => write!(f, "expected {expected}, got {given}"),
-            Problem::UnknownField { given, of, nearest } => {
+            MessageProblem::WrongType { expected, given } => write!(f, "expected {expected}, got {given}"),
+            MessageProblem::UnknownField { given, of, nearest } => {
                 write!(f, "`{of}` does not have a field `{given}`")?;
                 guess(f, nearest.as_ref())
             }
-            Problem::Twice(field) => write!(f, "the field `{field}` is given twice"),
-            Problem::UnknownConstant { given, of, nearest } => {
+            MessageProblem::Twice(field) => write!(f, "the field `{field}` is given twice"),
+            MessageProblem::UnknownConstant { given, of, nearest } => {
                 write!(f, "`{of}` does not define a constant `{given}` for this field")?;
                 guess(f, nearest.as_ref())
             }
-            Problem::Length { expected, given } => write!(f, "expected {expected}, got {given}"),
-            Problem::Truncated { needed, left } => {
+            MessageProblem::Length { expected, given } => write!(f, "expected {expected}, got {given}"),
+            MessageProblem::Truncated { needed, left } => {
                 write!(f, "the payload is too short: needs {needed} more bytes, has {left}")
             }
-            Problem::Trailing(count) => write!(f, "{count} bytes follow the message"),
-            Problem::Encoding(id) => write!(f, "expected the encoding CDR (0 or 1), got {id:#06x}"),
-            Problem::Boolean(byte) => write!(f, "expected a boolean, 0 or 1, got {byte}"),
-            Problem::Unterminated => f.write_str("the text does not end in a zero byte"),
-            Problem::NotUnicode => f.write_str("the text is not valid Unicode"),
-            Problem::Parts(most) => write!(f, "the message has more than {most} values"),
+            MessageProblem::Trailing(count) => write!(f, "{count} bytes follow the message"),
+            MessageProblem::Encoding(id) => write!(f, "expected the encoding CDR (0 or 1), got {id:#06x}"),
+            MessageProblem::Boolean(byte) => write!(f, "expected a boolean, 0 or 1, got {byte}"),
+            MessageProblem::Unterminated => f.write_str("the text does not end in a zero byte"),
+            MessageProblem::NotUnicode => f.write_str("the text is not valid Unicode"),
+            MessageProblem::Parts(most) => write!(f, "the message has more than {most} values"),
         }
     }
 }
@@ -300,11 +306,11 @@ impl From<MessageFault> for HostFailure {
     /// The arguments are the text and the path.
     fn from(fault: MessageFault) -> HostFailure {
         let cause = match fault.0.problem {
-            Problem::WrongType { .. }
-            | Problem::UnknownField { .. }
-            | Problem::Twice(_)
-            | Problem::UnknownConstant { .. }
-            | Problem::Length { .. } => "INVALID-MESSAGE",
+            MessageProblem::WrongType { .. }
+            | MessageProblem::UnknownField { .. }
+            | MessageProblem::Twice(_)
+            | MessageProblem::UnknownConstant { .. }
+            | MessageProblem::Length { .. } => "INVALID-MESSAGE",
             _ => "MALFORMED-PAYLOAD",
         };
         let mut failure = HostFailure::new(cause, &fault);

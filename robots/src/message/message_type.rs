@@ -10,7 +10,7 @@ use esl_bytecode::symbol::Symbol;
 use hiroz_schema::TypeDescription;
 
 use super::complete;
-use super::definition::{Constant, Extent};
+use super::definition::{FieldExtent, MessageConstant};
 use super::describe;
 use super::fault::DefinitionProblem;
 use super::scalar::Scalar;
@@ -40,7 +40,7 @@ pub enum Element {
 
 /// A field of a message.
 #[derive(Clone, Debug)]
-pub struct Field {
+pub struct MessageField {
     /// Its name in the definition.
     pub name: String,
     /// Its name in programs, a keyword.
@@ -48,7 +48,7 @@ pub struct Field {
     /// The type of its elements.
     pub element: Element,
     /// The number of its elements.
-    pub extent: Extent,
+    pub extent: FieldExtent,
     /// Its value where a program gives none.
     pub default: Datum,
 }
@@ -57,8 +57,8 @@ pub struct Field {
 #[derive(Debug)]
 pub struct MessageType {
     name: String,
-    pub(super) fields: Vec<Field>,
-    pub(super) constants: Vec<Constant>,
+    pub(super) fields: Vec<MessageField>,
+    pub(super) constants: Vec<MessageConstant>,
     /// Whether it is `builtin_interfaces/msg/Time` or `Duration`, for which a number of seconds may stand.
     pub(super) is_time: bool,
     /// Least number of bytes of a message, alignment apart; at least 1.
@@ -73,36 +73,41 @@ pub struct MessageType {
     hash: String,
 }
 
-impl Field {
+impl MessageField {
     /// Creates a field; without a default in the definition it has the default of its type.
-    pub(super) fn new(name: &str, element: Element, extent: Extent, default: Option<Datum>) -> Field {
+    pub(super) fn new(
+        name: &str,
+        element: Element,
+        extent: FieldExtent,
+        default: Option<Datum>,
+    ) -> MessageField {
         let default = default.unwrap_or_else(|| complete::default_of(&element, extent));
-        Field { name: name.to_owned(), keyword: keyword(name), element, extent, default }
+        MessageField { name: name.to_owned(), keyword: keyword(name), element, extent, default }
     }
 
     /// Creates a field that is a message.
-    pub(super) fn part(name: &str, message: &Arc<MessageType>) -> Field {
-        Field::new(name, Element::Message(message.clone()), Extent::One, None)
+    pub(super) fn part(name: &str, message: &Arc<MessageType>) -> MessageField {
+        MessageField::new(name, Element::Message(message.clone()), FieldExtent::One, None)
     }
 
     /// Creates a field that is a truth value.
-    pub(super) fn truth(name: &str) -> Field {
-        Field::new(name, Element::Scalar(Scalar::Bool), Extent::One, None)
+    pub(super) fn truth(name: &str) -> MessageField {
+        MessageField::new(name, Element::Scalar(Scalar::Bool), FieldExtent::One, None)
     }
 
     /// Creates a field that is the status of a goal.
-    pub(super) fn status(name: &str) -> Field {
-        Field::new(name, Element::Scalar(Scalar::Int8), Extent::One, None)
+    pub(super) fn status(name: &str) -> MessageField {
+        MessageField::new(name, Element::Scalar(Scalar::Int8), FieldExtent::One, None)
     }
 
     /// Checks that the default of a field can be made.
     ///
     /// # Errors
     /// It has too many elements.
-    pub(super) fn check_size(element: &Element, extent: Extent) -> Result<(), DefinitionProblem> {
+    pub(super) fn check_size(element: &Element, extent: FieldExtent) -> Result<(), DefinitionProblem> {
         let each = if let Element::Message(message) = element { message.fixed } else { 1 };
         match extent {
-            Extent::Fixed(count) if count.saturating_mul(each) > MAX_FIXED => {
+            FieldExtent::Fixed(count) if count.saturating_mul(each) > MAX_FIXED => {
                 Err(DefinitionProblem::Large(MAX_FIXED))
             }
             _ => Ok(()),
@@ -117,9 +122,9 @@ impl Field {
             Element::Message(message) => (message.least_size, message.fixed, message.depth),
         };
         match self.extent {
-            Extent::One => (size, fixed, depth),
-            Extent::Fixed(count) => (size.saturating_mul(count), fixed.saturating_mul(count), depth),
-            Extent::Sequence(_) => (4, 1, depth),
+            FieldExtent::One => (size, fixed, depth),
+            FieldExtent::Fixed(count) => (size.saturating_mul(count), fixed.saturating_mul(count), depth),
+            FieldExtent::Sequence(_) => (4, 1, depth),
         }
     }
 
@@ -134,10 +139,10 @@ impl Field {
             Element::Message(message) => message.name.clone(),
         };
         match self.extent {
-            Extent::One => {}
-            Extent::Fixed(count) => _ = write!(text, "[{count}]"),
-            Extent::Sequence(None) => text.push_str("[]"),
-            Extent::Sequence(Some(most)) => _ = write!(text, "[<={most}]"),
+            FieldExtent::One => {}
+            FieldExtent::Fixed(count) => _ = write!(text, "[{count}]"),
+            FieldExtent::Sequence(None) => text.push_str("[]"),
+            FieldExtent::Sequence(Some(most)) => _ = write!(text, "[<={most}]"),
         }
         text
     }
@@ -150,8 +155,8 @@ impl MessageType {
     /// It is too large or too deep.
     pub(super) fn new(
         name: String,
-        fields: Vec<Field>,
-        constants: Vec<Constant>,
+        fields: Vec<MessageField>,
+        constants: Vec<MessageConstant>,
     ) -> Result<MessageType, DefinitionProblem> {
         let (mut least_size, mut fixed, mut depth) = (0_usize, 0_usize, 0);
         for field in &fields {
@@ -209,12 +214,12 @@ impl MessageType {
     }
 
     /// Returns the fields, in their order.
-    pub fn fields(&self) -> &[Field] {
+    pub fn fields(&self) -> &[MessageField] {
         &self.fields
     }
 
     /// Returns the constants, in their order.
-    pub fn constants(&self) -> &[Constant] {
+    pub fn constants(&self) -> &[MessageConstant] {
         &self.constants
     }
 
@@ -233,11 +238,11 @@ impl MessageType {
     /// Returns the type as data: a property list with `:name`, `:hash`, `:fields`, a list of (keyword type
     /// default), and `:constants`, a list of (keyword value).
     pub fn description(&self) -> Datum {
-        let field = |field: &Field| {
+        let field = |field: &MessageField| {
             let type_text = Datum::string(&field.type_text(), Span::default());
             list([field.keyword.clone(), type_text, field.default.clone()])
         };
-        let constant = |constant: &Constant| list([keyword(&constant.name), constant.value.clone()]);
+        let constant = |constant: &MessageConstant| list([keyword(&constant.name), constant.value.clone()]);
         complete::plist([
             (&keyword("name"), Datum::string(&self.name, Span::default())),
             (&keyword("hash"), Datum::string(&self.hash, Span::default())),

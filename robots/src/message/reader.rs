@@ -1,6 +1,6 @@
 //! Payloads to messages: plain CDR, in either byte order.
 //!
-//! Guarantees: no payload makes the reader panic, nor take more memory than a small multiple of its length: the
+//! Guarantees: no payload makes the reader panic, nor take more memory than a multiple of its length: the
 //! length of a sequence is compared with the bytes that are left before anything is made of it.
 
 use std::sync::Arc;
@@ -11,9 +11,9 @@ use esl_bytecode::packed::PackedVector;
 use esl_bytecode::span::Span;
 
 use super::complete::{check_length, plist, step};
-use super::definition::Extent;
-use super::fault::{MessageFault, Problem, Step};
-use super::message_type::{Element, Field, MessageType};
+use super::definition::FieldExtent;
+use super::fault::{FieldStep, MessageFault, MessageProblem, MessageResult};
+use super::message_type::{Element, MessageField, MessageType};
 use super::scalar::{Scalar, boolean, float, vector};
 
 /// Greatest number of values of a message, elements of packed arrays apart. A program cannot take in more.
@@ -22,33 +22,31 @@ const MAX_PARTS: usize = 1_000_000;
 /// Bytes that may follow a message: some senders fill up the payload.
 const MAX_TRAILING: usize = 3;
 
-type Outcome<T> = Result<T, MessageFault>;
-
 /// Returns the message in a payload.
 ///
 /// # Errors
 /// The payload is not one of this type, with the path of the field at which that shows.
-pub fn decode(message_type: &MessageType, payload: &[u8]) -> Outcome<Datum> {
+pub fn decode(message_type: &MessageType, payload: &[u8]) -> MessageResult<Datum> {
     let decode = || {
         let (header, bytes) = payload
             .split_first_chunk::<4>()
-            .ok_or_else(|| MessageFault::new(Problem::Truncated { needed: 4, left: payload.len() }))?;
+            .ok_or_else(|| MessageFault::new(MessageProblem::Truncated { needed: 4, left: payload.len() }))?;
         let is_little = match u16::from_be_bytes([header[0], header[1]]) {
             0 => false,
             1 => true,
-            id => return Err(MessageFault::new(Problem::Encoding(id))),
+            id => return Err(MessageFault::new(MessageProblem::Encoding(id))),
         };
-        let mut reader = Reader { bytes, place: 0, is_little, parts: MAX_PARTS };
+        let mut reader = PayloadReader { bytes, place: 0, is_little, parts: MAX_PARTS };
         let message = reader.message(message_type)?;
         match reader.left() {
             0..=MAX_TRAILING => Ok(message),
-            trailing => Err(MessageFault::new(Problem::Trailing(trailing))),
+            trailing => Err(MessageFault::new(MessageProblem::Trailing(trailing))),
         }
     };
     decode().map_err(|fault: MessageFault| fault.of(message_type.name()))
 }
 
-struct Reader<'a> {
+struct PayloadReader<'a> {
     bytes: &'a [u8],
     place: usize,
     is_little: bool,
@@ -78,41 +76,42 @@ numbers!(integers_of_i32, i32, i64);
 numbers!(integers_of_u32, u32, i64);
 numbers!(integers_of_i64, i64, i64);
 
-impl<'a> Reader<'a> {
+impl<'a> PayloadReader<'a> {
     fn left(&self) -> usize {
         self.bytes.len() - self.place
     }
 
     /// Returns the next bytes, behind the padding before a value of this alignment.
-    fn take(&mut self, count: usize, alignment: usize) -> Outcome<&'a [u8]> {
+    fn take(&mut self, count: usize, alignment: usize) -> MessageResult<&'a [u8]> {
         let start = self.place.next_multiple_of(alignment);
         let taken = start.checked_add(count).and_then(|end| self.bytes.get(start..end));
         let Some(taken) = taken else {
             let needed = (start - self.place) as u64 + count as u64;
-            return Err(MessageFault::new(Problem::Truncated { needed, left: self.left() }));
+            return Err(MessageFault::new(MessageProblem::Truncated { needed, left: self.left() }));
         };
         self.place = start + count;
         Ok(taken)
     }
 
-    fn count_part(&mut self) -> Outcome<()> {
-        self.parts = self.parts.checked_sub(1).ok_or_else(|| MessageFault::new(Problem::Parts(MAX_PARTS)))?;
+    fn count_part(&mut self) -> MessageResult<()> {
+        self.parts =
+            self.parts.checked_sub(1).ok_or_else(|| MessageFault::new(MessageProblem::Parts(MAX_PARTS)))?;
         Ok(())
     }
 
     /// Returns the number of elements of a sequence, each of which takes at least so many bytes.
-    fn length(&mut self, least_size: usize) -> Outcome<usize> {
+    fn length(&mut self, least_size: usize) -> MessageResult<usize> {
         let bytes = self.take(4, 4)?;
         let bytes = bytes.try_into().unwrap_or_default();
         let length = if self.is_little { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) };
         let needed = u64::from(length) * least_size as u64;
         if needed > self.left() as u64 {
-            return Err(MessageFault::new(Problem::Truncated { needed, left: self.left() }));
+            return Err(MessageFault::new(MessageProblem::Truncated { needed, left: self.left() }));
         }
         Ok(length as usize)
     }
 
-    fn message(&mut self, message_type: &MessageType) -> Outcome<Datum> {
+    fn message(&mut self, message_type: &MessageType) -> MessageResult<Datum> {
         if message_type.fields.is_empty() {
             self.take(1, 1)?;
         }
@@ -123,16 +122,16 @@ impl<'a> Reader<'a> {
         Ok(plist(message_type.fields.iter().map(|field| &field.keyword).zip(values)))
     }
 
-    fn field(&mut self, field: &Field) -> Outcome<Datum> {
+    fn field(&mut self, field: &MessageField) -> MessageResult<Datum> {
         let least_size = match &field.element {
             Element::Scalar(scalar) => scalar.size(),
             Element::Text { .. } => 4,
             Element::Message(message) => message.least_size,
         };
         let count = match field.extent {
-            Extent::One => return self.element(&field.element),
-            Extent::Fixed(count) => count,
-            Extent::Sequence(_) => {
+            FieldExtent::One => return self.element(&field.element),
+            FieldExtent::Fixed(count) => count,
+            FieldExtent::Sequence(_) => {
                 let count = self.length(least_size)?;
                 check_length(field.extent, count)?;
                 count
@@ -144,14 +143,14 @@ impl<'a> Reader<'a> {
                 let mut items = Vec::with_capacity(count.min(self.left()));
                 for index in 0..count {
                     let item = self.element(&field.element);
-                    items.push(item.map_err(|fault| fault.inside(Step::Index(index)))?);
+                    items.push(item.map_err(|fault| fault.inside(FieldStep::Index(index)))?);
                 }
                 Ok(vector(items))
             }
         }
     }
 
-    fn packed(&mut self, scalar: Scalar, count: usize) -> Outcome<Datum> {
+    fn packed(&mut self, scalar: Scalar, count: usize) -> MessageResult<Datum> {
         self.count_part()?;
         // An empty sequence is not followed by the padding before its elements.
         let alignment = if count == 0 { 1 } else { scalar.size() };
@@ -181,7 +180,7 @@ impl<'a> Reader<'a> {
         Ok(Datum::new(DatumKind::Packed(packed), Span::default()))
     }
 
-    fn element(&mut self, element: &Element) -> Outcome<Datum> {
+    fn element(&mut self, element: &Element) -> MessageResult<Datum> {
         self.count_part()?;
         match element {
             Element::Message(message) => self.message(message),
@@ -192,7 +191,7 @@ impl<'a> Reader<'a> {
                 match most {
                     Some(most) if length > *most => {
                         let expected = format!("at most {most}");
-                        Err(MessageFault::new(Problem::Length { expected, given: length }))
+                        Err(MessageFault::new(MessageProblem::Length { expected, given: length }))
                     }
                     _ => Ok(Datum::string(&text, Span::default())),
                 }
@@ -200,13 +199,13 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn scalar(&mut self, scalar: Scalar) -> Outcome<Datum> {
+    fn scalar(&mut self, scalar: Scalar) -> MessageResult<Datum> {
         let size = scalar.size();
         let bytes = self.take(size, size)?;
         if scalar == Scalar::Bool {
             return match bytes[0] {
                 byte @ 0..=1 => Ok(boolean(byte == 1)),
-                byte => Err(MessageFault::new(Problem::Boolean(byte))),
+                byte => Err(MessageFault::new(MessageProblem::Boolean(byte))),
             };
         }
         let mut low = [0; 8];
@@ -226,7 +225,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn text(&mut self) -> Outcome<String> {
+    fn text(&mut self) -> MessageResult<String> {
         let length = self.length(1)?;
         // Some senders write an empty text without its zero byte.
         if length == 0 {
@@ -234,17 +233,17 @@ impl<'a> Reader<'a> {
         }
         let bytes = self.take(length, 1)?;
         let Some((0, text)) = bytes.split_last() else {
-            return Err(MessageFault::new(Problem::Unterminated));
+            return Err(MessageFault::new(MessageProblem::Unterminated));
         };
-        String::from_utf8(text.to_vec()).map_err(|_| MessageFault::new(Problem::NotUnicode))
+        String::from_utf8(text.to_vec()).map_err(|_| MessageFault::new(MessageProblem::NotUnicode))
     }
 
-    fn wide_text(&mut self) -> Outcome<String> {
+    fn wide_text(&mut self) -> MessageResult<String> {
         let length = self.length(4)?;
         let bytes = self.take(length * 4, 1)?;
         let units = integers_of_u32(bytes, self.is_little);
         let units: Option<Vec<u16>> = units.iter().map(|&unit| u16::try_from(unit).ok()).collect();
         let text = units.and_then(|units| String::from_utf16(&units).ok());
-        text.ok_or_else(|| MessageFault::new(Problem::NotUnicode))
+        text.ok_or_else(|| MessageFault::new(MessageProblem::NotUnicode))
     }
 }

@@ -9,24 +9,22 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::bundle;
 use super::complete::nearest;
-use super::definition::{Definition, ElementName, is_name};
-use super::fault::{DefinitionProblem, TypeFault};
-use super::message_type::{ActionType, Element, Field, MAX_DEPTH, MessageType, ServiceType};
+use super::definition::{ElementName, MessageDefinition, is_name};
+use super::fault::{DefinitionProblem, TypeFault, TypeResult};
+use super::message_type::{ActionType, Element, MAX_DEPTH, MessageField, MessageType, ServiceType};
 
 /// Greatest number of bytes of a file with a definition.
 const MAX_FILE: u64 = 1 << 20;
 
-type Outcome<T> = Result<T, TypeFault>;
-
 /// Types of messages, services and actions, by name. Clones share them.
 ///
-/// Definitions are taken from the texts that the program gives, then from folders in their order, then from those
-/// that come with ESL.
+/// Definitions are taken from the texts that the program gives, then from folders in their order, then from
+/// those that come with ESL.
 #[derive(Clone, Debug)]
-pub struct Types(Arc<Mutex<Known>>);
+pub struct Types(Arc<Mutex<KnownTypes>>);
 
 #[derive(Debug, Default)]
-struct Known {
+struct KnownTypes {
     folders: Vec<PathBuf>,
     given: HashMap<String, String>,
     messages: HashMap<String, Arc<MessageType>>,
@@ -34,30 +32,30 @@ struct Known {
     actions: HashMap<String, Arc<ActionType>>,
 }
 
-/// What a name denotes.
+/// The kinds of definitions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum DefinitionKind {
     Message,
     Service,
     Action,
 }
 
-impl Kind {
+impl DefinitionKind {
     /// Returns the name of the folder, which is the extension of the files too.
     fn folder(self) -> &'static str {
         match self {
-            Kind::Message => "msg",
-            Kind::Service => "srv",
-            Kind::Action => "action",
+            DefinitionKind::Message => "msg",
+            DefinitionKind::Service => "srv",
+            DefinitionKind::Action => "action",
         }
     }
 
     /// Returns the names of the messages that a definition consists of.
     fn parts(self) -> &'static [&'static str] {
         match self {
-            Kind::Message => &[""],
-            Kind::Service => &["_Request", "_Response"],
-            Kind::Action => &["_Goal", "_Result", "_Feedback"],
+            DefinitionKind::Message => &[""],
+            DefinitionKind::Service => &["_Request", "_Response"],
+            DefinitionKind::Action => &["_Goal", "_Result", "_Feedback"],
         }
     }
 }
@@ -84,13 +82,13 @@ impl Types {
         Types::with_folders(Vec::new())
     }
 
-    /// Creates types whose definitions are also searched in folders: a workspace's `install` or `share`, a folder
-    /// of packages, or a package.
+    /// Creates types whose definitions are also searched in folders: a workspace's `install` or `share`, a
+    /// folder of packages, or a package.
     pub fn with_folders(folders: Vec<PathBuf>) -> Types {
-        Types(Arc::new(Mutex::new(Known { folders, ..Known::default() })))
+        Types(Arc::new(Mutex::new(KnownTypes { folders, ..KnownTypes::default() })))
     }
 
-    fn known(&self) -> MutexGuard<'_, Known> {
+    fn known(&self) -> MutexGuard<'_, KnownTypes> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -101,15 +99,15 @@ impl Types {
         known.forget();
     }
 
-    /// Defines a type by the text of its definition. Behind it there may be the definitions of the types that it
-    /// names, each after a line of `=` and a line `MSG: package/Name`, as recordings have them.
+    /// Defines a type by the text of its definition. Behind it there may be the definitions of the types that
+    /// it names, each after a line of `=` and a line `MSG: package/Name`, as recordings have them.
     ///
     /// # Errors
     /// A name or a text that is wrong.
-    pub fn define(&self, name: &str, text: &str) -> Outcome<()> {
+    pub fn define(&self, name: &str, text: &str) -> TypeResult<()> {
         let mut given = Vec::new();
         for (index, (part_name, part)) in joined_definitions(name, text).into_iter().enumerate() {
-            let kind = if index == 0 { kind_of(&part_name) } else { Kind::Message };
+            let kind = if index == 0 { kind_of(&part_name) } else { DefinitionKind::Message };
             let full = full_name(&part_name, kind)?;
             parse_parts(&full, kind, part)?;
             given.push((full, part.to_owned()));
@@ -120,32 +118,32 @@ impl Types {
         Ok(())
     }
 
-    /// Returns the type of messages of a name: `package/msg/Name`, `package/Name`, or a part of a service or an
-    /// action, as `package/srv/Name_Request` and `package/action/Name_FeedbackMessage`.
+    /// Returns the type of messages of a name: `package/msg/Name`, `package/Name`, or a part of a service or
+    /// an action, as `package/srv/Name_Request` and `package/action/Name_FeedbackMessage`.
     ///
     /// # Errors
     /// There is none, or a definition that it depends on is wrong.
-    pub fn message(&self, name: &str) -> Outcome<Arc<MessageType>> {
+    pub fn message(&self, name: &str) -> TypeResult<Arc<MessageType>> {
         let mut known = self.known();
         let kind = kind_of(name);
         let full = full_name(name, kind)?;
-        if kind == Kind::Message {
+        if kind == DefinitionKind::Message {
             return known.message(&full, None, None);
         }
         known.part(&full, kind)
     }
 
-    /// Returns the type of services of a name: `package/srv/Name`, `package/Name`, or one of those that an action
-    /// consists of, `package/action/Name_SendGoal` and `package/action/Name_GetResult`.
+    /// Returns the type of services of a name: `package/srv/Name`, `package/Name`, or one of those that an
+    /// action consists of, `package/action/Name_SendGoal` and `package/action/Name_GetResult`.
     ///
     /// # Errors
     /// As for messages.
-    pub fn service(&self, name: &str) -> Outcome<Arc<ServiceType>> {
+    pub fn service(&self, name: &str) -> TypeResult<Arc<ServiceType>> {
         let mut known = self.known();
-        if kind_of(name) != Kind::Action {
-            return known.service(&full_name(name, Kind::Service)?);
+        if kind_of(name) != DefinitionKind::Action {
+            return known.service(&full_name(name, DefinitionKind::Service)?);
         }
-        let full = full_name(name, Kind::Action)?;
+        let full = full_name(name, DefinitionKind::Action)?;
         if let Some(whole) = full.strip_suffix("_SendGoal") {
             return Ok(known.action(whole)?.send_goal.clone());
         }
@@ -159,15 +157,15 @@ impl Types {
     ///
     /// # Errors
     /// As for messages.
-    pub fn action(&self, name: &str) -> Outcome<Arc<ActionType>> {
-        self.known().action(&full_name(name, Kind::Action)?)
+    pub fn action(&self, name: &str) -> TypeResult<Arc<ActionType>> {
+        self.known().action(&full_name(name, DefinitionKind::Action)?)
     }
 
     /// Returns the text of the definition of a type.
     ///
     /// # Errors
     /// There is none.
-    pub fn text(&self, name: &str) -> Outcome<String> {
+    pub fn text(&self, name: &str) -> TypeResult<String> {
         let kind = kind_of(name);
         let full = full_name(name, kind)?;
         let known = self.known();
@@ -186,16 +184,16 @@ impl Types {
 }
 
 /// Returns the kind that a full name denotes; a message, if it is not a full name.
-fn kind_of(name: &str) -> Kind {
+fn kind_of(name: &str) -> DefinitionKind {
     match name.split('/').nth(1) {
-        Some("srv") => Kind::Service,
-        Some("action") => Kind::Action,
-        _ => Kind::Message,
+        Some("srv") => DefinitionKind::Service,
+        Some("action") => DefinitionKind::Action,
+        _ => DefinitionKind::Message,
     }
 }
 
 /// Returns the full name of a type, whose parts are names: it has neither `..` nor separators of paths.
-fn full_name(name: &str, kind: Kind) -> Outcome<String> {
+fn full_name(name: &str, kind: DefinitionKind) -> TypeResult<String> {
     let parts: Vec<&str> = name.split('/').collect();
     let wrong = || TypeFault::Name { name: name.to_owned(), kind: kind.folder() };
     if !parts.iter().all(|part| is_name(part)) {
@@ -230,10 +228,10 @@ fn joined_definitions<'a>(name: &str, text: &'a str) -> Vec<(String, &'a str)> {
 }
 
 /// Returns the contents of the messages of a definition.
-fn parse_parts(name: &str, kind: Kind, text: &str) -> Outcome<Vec<Definition>> {
+fn parse_parts(name: &str, kind: DefinitionKind, text: &str) -> TypeResult<Vec<MessageDefinition>> {
     let wrong = |(line, problem)| TypeFault::Definition { name: name.to_owned(), line, problem };
-    if kind == Kind::Message {
-        return Ok(vec![Definition::parse(text, 0).map_err(wrong)?]);
+    if kind == DefinitionKind::Message {
+        return Ok(vec![MessageDefinition::parse(text, 0).map_err(wrong)?]);
     }
     let lines: Vec<&str> = text.lines().collect();
     let parts: Vec<&[&str]> = lines.split(|line| line.trim() == "---").collect();
@@ -244,13 +242,13 @@ fn parse_parts(name: &str, kind: Kind, text: &str) -> Outcome<Vec<Definition>> {
     let mut first = 0;
     let mut definitions = Vec::new();
     for part in parts {
-        definitions.push(Definition::parse(&part.join("\n"), first).map_err(wrong)?);
+        definitions.push(MessageDefinition::parse(&part.join("\n"), first).map_err(wrong)?);
         first += part.len() + 1;
     }
     Ok(definitions)
 }
 
-impl Known {
+impl KnownTypes {
     /// Forgets resolved types: a new definition may be one of theirs. Programs keep those that they have.
     fn forget(&mut self) {
         self.messages.clear();
@@ -259,9 +257,9 @@ impl Known {
     }
 
     /// Returns the message that is a part of a service or an action, by its full name.
-    fn part(&mut self, full: &str, kind: Kind) -> Outcome<Arc<MessageType>> {
+    fn part(&mut self, full: &str, kind: DefinitionKind) -> TypeResult<Arc<MessageType>> {
         let unknown = || TypeFault::Unknown { name: full.to_owned(), nearest: None, used_by: None };
-        if kind == Kind::Service {
+        if kind == DefinitionKind::Service {
             if let Some(whole) = full.strip_suffix("_Request") {
                 return Ok(self.service(whole)?.request.clone());
             }
@@ -295,7 +293,7 @@ impl Known {
     }
 
     /// Returns the text of a definition, wherever it is found first.
-    fn text(&self, full: &str, kind: Kind) -> Outcome<Option<String>> {
+    fn text(&self, full: &str, kind: DefinitionKind) -> TypeResult<Option<String>> {
         if let Some(text) = self.given.get(full) {
             return Ok(Some(text.clone()));
         }
@@ -307,7 +305,7 @@ impl Known {
         Ok(bundle::definitions().get(full).map(|&text| text.to_owned()))
     }
 
-    fn unknown(&self, full: &str, kind: Kind, used_by: Option<(String, usize)>) -> TypeFault {
+    fn unknown(&self, full: &str, kind: DefinitionKind, used_by: Option<(String, usize)>) -> TypeFault {
         let of_kind = |name: &&str| kind_of(name) == kind;
         let bundled = bundle::definitions().keys().copied();
         let names = bundled.chain(self.given.keys().map(String::as_str)).filter(of_kind);
@@ -322,9 +320,9 @@ impl Known {
     fn definitions(
         &self,
         full: &str,
-        kind: Kind,
+        kind: DefinitionKind,
         used_by: Option<(String, usize)>,
-    ) -> Outcome<Vec<Definition>> {
+    ) -> TypeResult<Vec<MessageDefinition>> {
         let text = self.text(full, kind)?.ok_or_else(|| self.unknown(full, kind, used_by))?;
         parse_parts(full, kind, &text)
     }
@@ -334,7 +332,7 @@ impl Known {
         full: &str,
         used_by: Option<(String, usize)>,
         outer: Option<&Chain<'_>>,
-    ) -> Outcome<Arc<MessageType>> {
+    ) -> TypeResult<Arc<MessageType>> {
         if let Some(known) = self.messages.get(full) {
             return Ok(known.clone());
         }
@@ -357,8 +355,8 @@ impl Known {
         full: &str,
         used_by: Option<(String, usize)>,
         outer: Option<&Chain<'_>>,
-    ) -> Outcome<Arc<MessageType>> {
-        let mut definitions = self.definitions(full, Kind::Message, used_by)?;
+    ) -> TypeResult<Arc<MessageType>> {
+        let mut definitions = self.definitions(full, DefinitionKind::Message, used_by)?;
         let chain = Chain { name: full, outer };
         let definition = definitions.pop().unwrap_or_default();
         let message = self.resolved(full, definition, &chain)?;
@@ -370,9 +368,9 @@ impl Known {
     fn resolved(
         &mut self,
         full: &str,
-        definition: Definition,
+        definition: MessageDefinition,
         chain: &Chain<'_>,
-    ) -> Outcome<Arc<MessageType>> {
+    ) -> TypeResult<Arc<MessageType>> {
         let own_package = full.split('/').next().unwrap_or_default();
         let mut fields = Vec::new();
         for field in definition.fields {
@@ -388,18 +386,18 @@ impl Known {
             // The default of a fixed array has all elements, so its size comes first.
             let line = field.line;
             let wrong = |problem| TypeFault::Definition { name: chain.name.to_owned(), line, problem };
-            Field::check_size(&element, field.extent).map_err(wrong)?;
-            fields.push(Field::new(&field.name, element, field.extent, field.default));
+            MessageField::check_size(&element, field.extent).map_err(wrong)?;
+            fields.push(MessageField::new(&field.name, element, field.extent, field.default));
         }
         let wrong = |problem| TypeFault::Definition { name: chain.name.to_owned(), line: 1, problem };
         MessageType::new(full.to_owned(), fields, definition.constants).map(Arc::new).map_err(wrong)
     }
 
-    fn service(&mut self, full: &str) -> Outcome<Arc<ServiceType>> {
+    fn service(&mut self, full: &str) -> TypeResult<Arc<ServiceType>> {
         if let Some(known) = self.services.get(full) {
             return Ok(known.clone());
         }
-        let definitions = self.definitions(full, Kind::Service, None)?;
+        let definitions = self.definitions(full, DefinitionKind::Service, None)?;
         let [request, response] = self.parts(full, definitions)?;
         let service = self.new_service(full.to_owned(), request, response)?;
         self.services.insert(full.to_owned(), service.clone());
@@ -411,7 +409,7 @@ impl Known {
         name: String,
         request: Arc<MessageType>,
         response: Arc<MessageType>,
-    ) -> Outcome<Arc<ServiceType>> {
+    ) -> TypeResult<Arc<ServiceType>> {
         let info = self.message("service_msgs/msg/ServiceEventInfo", None, None)?;
         Ok(Arc::new(ServiceType::new(name, request, response, &info)))
     }
@@ -420,8 +418,8 @@ impl Known {
     fn parts<const N: usize>(
         &mut self,
         full: &str,
-        parts: Vec<Definition>,
-    ) -> Outcome<[Arc<MessageType>; N]> {
+        parts: Vec<MessageDefinition>,
+    ) -> TypeResult<[Arc<MessageType>; N]> {
         let chain = Chain { name: full, outer: None };
         let suffixes = kind_of(full).parts();
         let mut messages = Vec::new();
@@ -435,25 +433,28 @@ impl Known {
         })
     }
 
-    fn action(&mut self, full: &str) -> Outcome<Arc<ActionType>> {
+    fn action(&mut self, full: &str) -> TypeResult<Arc<ActionType>> {
         if let Some(known) = self.actions.get(full) {
             return Ok(known.clone());
         }
-        let definitions = self.definitions(full, Kind::Action, None)?;
+        let definitions = self.definitions(full, DefinitionKind::Action, None)?;
         let [goal, result, feedback] = self.parts(full, definitions)?;
         let wrong = |problem| TypeFault::Definition { name: full.to_owned(), line: 1, problem };
-        let made = |suffix: &str, fields: Vec<Field>| {
+        let made = |suffix: &str, fields: Vec<MessageField>| {
             MessageType::new(format!("{full}{suffix}"), fields, Vec::new()).map(Arc::new).map_err(wrong)
         };
-        let id = Field::part("goal_id", &self.message("unique_identifier_msgs/msg/UUID", None, None)?);
-        let stamp = Field::part("stamp", &self.message("builtin_interfaces/msg/Time", None, None)?);
+        let id = MessageField::part("goal_id", &self.message("unique_identifier_msgs/msg/UUID", None, None)?);
+        let stamp = MessageField::part("stamp", &self.message("builtin_interfaces/msg/Time", None, None)?);
         let feedback_message =
-            made("_FeedbackMessage", vec![id.clone(), Field::part("feedback", &feedback)])?;
-        let send_goal_request = made("_SendGoal_Request", vec![id.clone(), Field::part("goal", &goal)])?;
-        let send_goal_response = made("_SendGoal_Response", vec![Field::truth("accepted"), stamp])?;
+            made("_FeedbackMessage", vec![id.clone(), MessageField::part("feedback", &feedback)])?;
+        let send_goal_request =
+            made("_SendGoal_Request", vec![id.clone(), MessageField::part("goal", &goal)])?;
+        let send_goal_response = made("_SendGoal_Response", vec![MessageField::truth("accepted"), stamp])?;
         let get_result_request = made("_GetResult_Request", vec![id])?;
-        let get_result_response =
-            made("_GetResult_Response", vec![Field::status("status"), Field::part("result", &result)])?;
+        let get_result_response = made(
+            "_GetResult_Response",
+            vec![MessageField::status("status"), MessageField::part("result", &result)],
+        )?;
         let send_goal =
             self.new_service(format!("{full}_SendGoal"), send_goal_request, send_goal_response)?;
         let get_result =
@@ -475,7 +476,7 @@ impl Known {
 }
 
 /// Returns the text of a definition in a folder.
-fn text_in(folder: &Path, full: &str, kind: Kind) -> Outcome<Option<String>> {
+fn text_in(folder: &Path, full: &str, kind: DefinitionKind) -> TypeResult<Option<String>> {
     let Some((package, rest)) = full.split_once('/') else { return Ok(None) };
     let file = format!("{rest}.{}", kind.folder());
     let itself = (folder.file_name() == Some(package.as_ref())).then(|| folder.join(&file));

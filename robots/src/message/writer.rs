@@ -5,9 +5,9 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::packed::PackedVector;
 
 use super::complete::complete;
-use super::definition::Extent;
+use super::definition::FieldExtent;
 use super::fault::MessageFault;
-use super::message_type::{Element, Field, MessageType};
+use super::message_type::{Element, MessageField, MessageType};
 use super::scalar::Scalar;
 
 /// Header of a payload: plain CDR, little-endian, no options.
@@ -19,16 +19,16 @@ const HEADER: [u8; 4] = [0, 1, 0, 0];
 /// As [`complete`].
 pub fn encode(message_type: &MessageType, message: &Datum) -> Result<Bytes, MessageFault> {
     let message = complete(message_type, message)?;
-    let mut writer = Writer { bytes: HEADER.to_vec() };
+    let mut writer = PayloadWriter { bytes: HEADER.to_vec() };
     writer.message(message_type, &message);
     Ok(writer.bytes.into())
 }
 
-struct Writer {
+struct PayloadWriter {
     bytes: Vec<u8>,
 }
 
-impl Writer {
+impl PayloadWriter {
     /// Fills up to the next multiple of `size`, counted from the end of the header.
     fn align(&mut self, size: usize) {
         let length = (self.bytes.len() - HEADER.len()).next_multiple_of(size);
@@ -54,16 +54,16 @@ impl Writer {
         }
     }
 
-    fn field(&mut self, field: &Field, value: &Datum) {
+    fn field(&mut self, field: &MessageField, value: &Datum) {
         let count = match value.kind() {
             DatumKind::Packed(packed) => packed.len(),
             DatumKind::Vector(items) => items.len(),
             _ => 0,
         };
         match field.extent {
-            Extent::One => return self.element(&field.element, value),
-            Extent::Sequence(_) => self.length(count),
-            Extent::Fixed(_) => {}
+            FieldExtent::One => return self.element(&field.element, value),
+            FieldExtent::Sequence(_) => self.length(count),
+            FieldExtent::Fixed(_) => {}
         }
         match (value.kind(), &field.element) {
             (DatumKind::Packed(packed), Element::Scalar(scalar)) => self.packed(*scalar, packed),
