@@ -1,14 +1,16 @@
 //! HTTP 1.1 by hyper: requests of the program's, and a server that hands requests to the program.
 //!
 //! The modules have a part each: `target` what a URL says, `client` and `coding` a request and the body of
-//! its answer, `server` and `peer` the connections of others. Which function answers a request, and which
-//! redirections are followed, is decided in `modules/http.esl`.
+//! its answer, `server`, `peer`, `greeting` and `address` the connections of others. Which function answers a
+//! request, and which redirections are followed, is decided in `modules/http.esl`.
 //!
 //! Guarantees: what a peer sends is bounded in size, and in time where the program cannot bound it; nothing
 //! that the program gives for a header or a URL can end a line; a connection ends when its call is left.
 
+mod address;
 mod client;
 mod coding;
+mod greeting;
 mod peer;
 mod server;
 mod target;

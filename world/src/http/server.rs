@@ -23,10 +23,12 @@ use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper::{Method, Request, Response, StatusCode, Version};
 use hyper_util::rt::{TokioIo, TokioTimer};
-use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpListener;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot, watch};
 
+use super::address::AddressCounts;
+use super::greeting::{Greeted, UnknownVersion};
 use super::peer::Peer;
 use super::{HEAD, HEADERS, headers_as_pairs, headers_of, http_failure, target};
 use crate::event_loop;
@@ -46,6 +48,11 @@ const BODIES: usize = 256 << 10;
 /// Time in which the last answers have to be sent when a server is closed.
 const GOODBYE: Duration = Duration::from_secs(1);
 
+/// The answer to a request in a version of HTTP that the server does not speak.
+const UNKNOWN_VERSION: &[u8] = b"HTTP/1.1 505 HTTP Version Not Supported\r\n\
+    Content-Type: text/plain; charset=utf-8\r\nContent-Length: 28\r\nConnection: close\r\n\r\n\
+    this server speaks HTTP 1.1\n";
+
 type HttpAnswer = Response<Full<Bytes>>;
 
 /// The state that the connections of a server share with the operations.
@@ -54,6 +61,7 @@ struct ServerState {
     /// Where the answers go, by the numbers of their requests; the greatest number so far.
     asked: Mutex<(i64, HashMap<i64, oneshot::Sender<HttpAnswer>>)>,
     connections: Arc<Semaphore>,
+    addresses: Arc<AddressCounts>,
     bodies: Arc<Semaphore>,
 }
 
@@ -92,10 +100,11 @@ pub(super) fn add(rows: &mut HostRows) {
     rows.operation(
         spawned,
         "%HTTP-LISTEN",
-        ["server", "input", "address", "certificate", "key"],
-        "Has SERVER listen at ADDRESS; by TLS, if there are files of CERTIFICATE and KEY. Returns the port. The input \
-         with the name INPUT is signalled with each request: its number, method, path, the parts of that, query, \
-         headers, and body, a text; and with the number alone when the client of one has gone.",
+        ["server", "input", "address", "most", "certificate", "key"],
+        "Has SERVER listen at ADDRESS, for at MOST so many connections from one address; by TLS, if there are files of \
+         CERTIFICATE and KEY. Returns the port. The input with the name INPUT is signalled with each request: its \
+         number, method, path, the parts of that, query, headers, and body, a text if it is UTF-8, and bytes \
+         otherwise; and with the number alone when the client of one has gone.",
         listen,
     )
     .needs(Right::Net, "address")
@@ -144,6 +153,7 @@ async fn listen(
     server: HostHandle<ServerSlot>,
     input: HostInput,
     address: String,
+    most: usize,
     certificate: Option<String>,
     key: Option<String>,
 ) -> Result<u16, HostFailure> {
@@ -154,6 +164,7 @@ async fn listen(
         input,
         asked: Mutex::default(),
         connections: Arc::new(Semaphore::new(CONNECTIONS)),
+        addresses: AddressCounts::new(most),
         bodies: Arc::new(Semaphore::new(BODIES)),
     });
     let (closing, closes) = watch::channel(false);
@@ -223,14 +234,19 @@ async fn accept(
     loop {
         let connection = async {
             let permit = shared.connections.clone().acquire_owned().await.ok()?;
-            let (stream, _) = next_connection(|| listener.accept()).await.ok()?;
-            Some((permit, Peer::new(stream)))
+            let (stream, address) = next_connection(|| listener.accept()).await.ok()?;
+            Some((permit, stream, address))
         };
-        let Some(Some((permit, peer))) = unless_closing(closes.clone(), connection).await else { return };
+        let Some(Some((permit, stream, address))) = unless_closing(closes.clone(), connection).await else {
+            return;
+        };
+        // One too many is closed without an answer, which would take a place.
+        let Some(counted) = shared.addresses.enter(address.ip()) else { continue };
+        let peer = Peer::new(stream);
         let (secured, shared, closes) = (secured.clone(), shared.clone(), closes.clone());
         tokio::spawn(async move {
             secured.converse(peer, shared, closes).await;
-            drop(permit);
+            drop((counted, permit));
         });
     }
 }
@@ -241,6 +257,18 @@ async fn converse(
     shared: Arc<ServerState>,
     closes: watch::Receiver<bool>,
 ) {
+    let greeted = tokio::time::timeout(HEAD_TIME, Greeted::read(stream));
+    let stream = match unless_closing(closes.clone(), greeted).await {
+        Some(Ok(Ok(Ok(stream)))) => stream,
+        Some(Ok(Ok(Err(UnknownVersion(mut stream))))) => {
+            // The client may have gone.
+            _ = stream.write_all(UNKNOWN_VERSION).await;
+            _ = stream.flush().await;
+            drop((closes, stream));
+            return peer.end().await;
+        }
+        _ => return,
+    };
     let service = service_fn(|request| respond(request, peer.clone(), shared.clone()));
     let mut builder = http1::Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME).half_close(true);
@@ -422,7 +450,10 @@ fn as_data(id: i64, head: &Parts, body: &[u8]) -> Vec<Datum> {
         target::parts(head.uri.path()).into_datum(),
         target::query(head.uri.query().unwrap_or_default()).into_datum(),
         headers_as_pairs(&head.headers).into_datum(),
-        String::from_utf8_lossy(body).as_ref().into_datum(),
+        match str::from_utf8(body) {
+            Ok(text) => text.into_datum(),
+            Err(_) => Bytes::copy_from_slice(body).into_datum(),
+        },
     ]
 }
 

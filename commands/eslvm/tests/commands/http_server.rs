@@ -20,11 +20,16 @@ pub(crate) struct Served {
 impl Served {
     /// Begins a program with these definitions and routes.
     pub(crate) fn begin(folder: &Folder, definitions: &str, routes: &str) -> Served {
+        Served::begin_with(folder, "", definitions, routes)
+    }
+
+    /// Begins one with these options.
+    fn begin_with(folder: &Folder, options: &str, definitions: &str, routes: &str) -> Served {
         let text = format!(
             "(require :http)
 {definitions}
 (spawn (:name 'server :daemon t)
-  (http:with-server (0 :started (lambda (port) (format t \"~d~%\" port) (finish-output)))
+  (http:with-server (0 :started (lambda (port) (format t \"~d~%\" port) (finish-output)) {options})
 {routes}))
 (read-line)"
         );
@@ -142,7 +147,11 @@ const REQUESTS: &[(&str, &str, &[&str])] = &[
     ("2.2", "GET /hello/a HTTP/1.1\nHost: x\n\nEND", &["200 hello a", "200 end"]),
     ("2.2", "GET /hello/a HTTP/1.1\r\n Host: x\r\n\r\nEND", &["400"]),
     ("2.2", "GET /hello/a HTTP/1.1\r\nHost: x\r\nX: a\rb\r\n\r\nEND", &["400"]),
-    ("2.3", "GET /hello/a HTTP/9.9\r\nHost: x\r\n\r\nEND", &["400"]),
+    ("2.3", "GET /hello/a HTTP/9.9\r\nHost: x\r\n\r\nEND", &["505"]),
+    ("2.3", "\r\nGET /hello/a HTTP/0.9\nHost: x\n\nEND", &["505"]),
+    ("2.3", "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", &["505"]),
+    ("2.3", "GET /hello/a HTTP/1.2\r\nHost: x\r\n\r\nEND", &["200 hello a", "200 end"]),
+    ("2.3", "GET /hello/a HTTP/1.x\r\nHost: x\r\n\r\nEND", &["400"]),
     ("2.3", "GET /hello/a http/1.1\r\nHost: x\r\n\r\nEND", &["400"]),
     ("3", "GET /hello/a\r\n\r\nEND", &["400"]),
     ("3", "GET  /hello/a HTTP/1.1\r\nHost: x\r\n\r\nEND", &["400"]),
@@ -273,6 +282,68 @@ fn heads_and_bodies_have_limits() {
     let begin = "POST /echo HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n";
     assert_eq!(ask(format!("{begin}{}0\r\n\r\n", chunk.repeat(66))), ["413"]);
     assert_eq!(ask(END.into()), ["200 end"], "it goes on");
+    assert_eq!(served.end().status, Some(0));
+}
+
+/// A body is there as bytes, whatever they are, and as a text.
+#[test]
+fn bodies_are_bytes_and_texts() {
+    let routes = r#"
+    (:post "/bytes" () (http:request-bytes http:*request*))
+    (:post "/text" () (let ((text (http:request-body http:*request*))) (format nil "~d ~a" (length text) text)))"#;
+    let folder = Folder::new("http-bodies");
+    let served = Served::begin(&folder, "", routes);
+    let post = |path: &str, body: &[u8]| {
+        let head = format!(
+            "POST {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: {}\r\n\r\n",
+            body.len()
+        );
+        let answer = served.ask(&[head.as_bytes(), body].concat());
+        let end = answer.windows(4).position(|bytes| bytes == b"\r\n\r\n").expect("it has a head");
+        answer[end + 4..].to_vec()
+    };
+    let all: Vec<u8> = (0..=255).collect();
+    // Characters of each length lie across the ends of pieces.
+    let long = format!("x{}", "é€😀".repeat(20_000));
+    let cut = [long.as_bytes(), b"\xff", long.as_bytes()].concat();
+    for body in [&b""[..], b"text", &all, long.as_bytes(), &cut, &[0x80; 40_000]] {
+        assert!(post("/bytes", body) == body, "{} bytes", body.len());
+        let text = String::from_utf8_lossy(body);
+        let expected = format!("{} {text}", text.chars().count());
+        assert!(post("/text", body) == expected.as_bytes(), "{} bytes", body.len());
+    }
+    assert_eq!(served.end().status, Some(0));
+}
+
+/// The connections of one address leave room for those of others.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_address_has_a_limit_of_connections() {
+    let folder = Folder::new("http-addresses");
+    let served = Served::begin_with(&folder, ":per-address 3", "", ROUTES);
+    let ask = |from: [u8; 4]| {
+        let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None);
+        let socket = socket.expect("there are sockets");
+        socket.bind(&std::net::SocketAddr::from((from, 0)).into()).expect("all of 127/8 is here");
+        socket
+            .connect(&std::net::SocketAddr::from(([127, 0, 0, 1], served.port)).into())
+            .expect("it listens");
+        let mut stream = TcpStream::from(socket);
+        stream.set_read_timeout(Some(Duration::from_secs(60))).expect("it can be set");
+        let sent = stream.write_all(b"GET /end HTTP/1.1\r\nHost: x\r\n\r\n");
+        let mut answer = [0; 12];
+        let status = sent.and_then(|()| stream.read_exact(&mut answer));
+        (status.is_ok_and(|()| answer.ends_with(b"200")), stream)
+    };
+    let mut open: Vec<(bool, TcpStream)> = (0..3).map(|_| ask([127, 0, 0, 1])).collect();
+    assert!(open.iter().all(|(is_answered, _)| *is_answered), "there is room for three");
+    assert!(!ask([127, 0, 0, 1]).0, "the fourth is closed");
+    let other = ask([127, 0, 0, 2]);
+    assert!(other.0, "another address has room of its own");
+    // The place is free again when the server has noticed that the client has gone.
+    drop(open.pop());
+    crate::operate::until("a place", || ask([127, 0, 0, 1]).0);
+    drop((open, other));
     assert_eq!(served.end().status, Some(0));
 }
 

@@ -78,6 +78,23 @@ fn a_connection_of_a_server_ends_with_its_body() {
     check("peers-server", &text, &expected);
 }
 
+/// The end of the main task is that of a server that is a daemon, and of its connections.
+#[test]
+fn connections_of_a_daemon_keep_no_run_from_ending() {
+    let text = "(require :sockets)
+(defvar *port* nil)
+(defun server ()
+  (let ((listener (sockets:listen \"127.0.0.1\" 0)))
+    (setq *port* (sockets:local-port listener))
+    (sockets::serve listener nil
+                    (lambda (c) (write-line \"hello\" c) (finish-output c)
+                      (unwind-protect (read-line c) (print 'ended))))))
+(spawn (:name 'server :daemon t) (server))
+(wait-until *port*)
+(print (read-line (sockets:connect \"127.0.0.1\" *port*)))";
+    check("peers-daemon", text, &["\"hello\"", "ENDED"]);
+}
+
 /// More peers than the system gives descriptors for wait, and end nothing.
 #[cfg(target_os = "linux")]
 #[test]
