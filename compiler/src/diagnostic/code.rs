@@ -453,6 +453,11 @@ CONCURRENT_OPERATION = "concurrent-operation" Warning
                (with-guardian (loop until (< *battery* 1) do (sleep 1))\n                (fail :battery-low)\n              \
                (drive 'lab)))\n          'stopped)\n  (drive 'dock))\n"
 
+NOT_AN_OPERATION = "not-an-operation" Warning
+    /// A function that is not an operation where one is needed, or a parameter that an operation lacks.
+    fails: "(defun camera ()\n  'picture)\n(define-exclusive camera)\n"
+    repaired: "(define-mock camera ()\n  'picture)\n(define-exclusive camera)\n"
+
 DUPLICATE_DEFINITION = "duplicate-definition" Warning
     /// A cause, goal, rule or property that a file defines twice.
     fails: "(define-cause :stuck ())\n(define-cause :stuck (:general-failure))\n\

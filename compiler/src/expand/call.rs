@@ -91,7 +91,7 @@ impl Expander {
         }
         if global.locked && global.instead.is_some() {
             // The arguments need not be forms. They are left out of the call, which fails in any case.
-            let place = self.place_of_use(form.span, to);
+            let place = self.place_of_use(form.span, to.origin);
             self.globals.note_reference(FunctionName::plain(&form.operator), place);
             self.fill(to, NodeKind::Call(Callee::Global(form.operator.clone()), Vec::new()));
             return Ok(());
@@ -203,7 +203,7 @@ impl Expander {
         function.check_callable(form)?;
         let builtin = if function.name.is_setf { None } else { Builtin::named(&function.cell) };
         let Some(builtin) = builtin else {
-            let name = self.place_of_use(form.at(function.datum.span()), to);
+            let name = self.place_of_use(form.at(function.datum.span()), to.origin);
             match args {
                 None => self.globals.note_reference(function.name.clone(), name),
                 Some(args) => {

@@ -19,6 +19,7 @@ use super::directive::arguments_of;
 use super::expander::Expander;
 use super::form::{Form, is_known, name, on_one_line, operator, plain};
 use super::global::CauseArguments;
+use super::operation;
 use super::origin::OriginId;
 use super::trap::traps;
 use crate::diagnostic::code;
@@ -42,9 +43,10 @@ static CHECKS: LazyLock<FxHashMap<Symbol, FormCheck>> = LazyLock::new(|| {
     ];
     let own: &[(&str, FormCheck)] = &[
         ("ASSERT", assert),
-        ("DEFINE-MOCK", operation),
+        ("DEFINE-EXCLUSIVE", operation::exclusive),
+        ("DEFINE-MOCK", operation::mock),
         ("FAIL", fail),
-        ("START", operation),
+        ("START", operation::start),
         ("WITH-RECOVERY-PROCEDURES", recovery),
         ("WITH-CLEANUP-PROCEDURE", body),
         ("WITH-BUDGET", body),
@@ -57,6 +59,7 @@ static CHECKS: LazyLock<FxHashMap<Symbol, FormCheck>> = LazyLock::new(|| {
         ("WITH-RIGHTS", body),
         ("WITH-SUSPENSION-PROCEDURES", body),
         ("WITH-TIMEOUT", body),
+        ("WITH-WORLD", operation::world),
         ("WITHOUT-INTERRUPTS", body),
     ];
     let standard = standard.iter().map(|&(name, check)| (Symbol::cl(name), check));
@@ -210,14 +213,6 @@ fn recovery(expander: &mut Expander, environment: &dyn Environment, form: &Form,
             let named = CauseArguments { count: count as u32, place: form.at(head.span()) };
             expander.globals.note_procedure(cause, named);
         }
-    }
-}
-
-/// `(define-mock name …)` or `(start (name …))`: the name is one of an operation.
-fn operation(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
-    let Some(named) = form.args.first() else { return };
-    if let Some(symbol) = named.as_symbol().or_else(|| operator(named)) {
-        expander.globals.operations.insert(symbol.clone());
     }
 }
 

@@ -9,6 +9,7 @@ use esl_bytecode::symbol::Symbol;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::function::FunctionName;
+use super::operation::UnitOperations;
 use super::trap::GuardianTrap;
 use crate::diagnostic::code;
 
@@ -79,10 +80,10 @@ pub(super) struct GlobalUses {
     pub(super) failures: Vec<(Symbol, CauseArguments)>,
     /// Of the recovery procedures for a cause, the one that names the fewest arguments.
     pub(super) procedures: FxHashMap<Symbol, CauseArguments>,
-    /// Operations that recovery procedures call above calls of the same.
+    /// UnitOperations that recovery procedures call above calls of the same.
     pub(super) traps: Vec<GuardianTrap>,
-    /// Names that the unit uses as operations.
-    pub(super) operations: FxHashSet<Symbol>,
+    /// UnitOperations that the unit defines and uses.
+    pub(super) operations: UnitOperations,
     /// Causes, goals and the like that top-level forms define, by source, kind and name, and their places.
     pub(super) definitions: FxHashMap<(SourceId, &'static str, String), Span>,
     /// Functions that the unit defines; `None` if several definitions differ in the number of arguments.

@@ -168,7 +168,7 @@ impl Expander {
                 return Err(no_function(form, function));
             }
         }
-        let place = self.place_of_use(to.span, to);
+        let place = self.place_of_use(to.span, to.origin);
         self.globals.note_reference(function.name.clone(), place);
         Ok(NodeKind::FunctionRef(function.cell.clone()))
     }

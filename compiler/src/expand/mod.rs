@@ -100,6 +100,7 @@ mod lambda;
 mod lambda_list;
 mod local;
 mod modify;
+mod operation;
 pub mod operator;
 mod origin;
 mod place;

@@ -85,6 +85,27 @@ impl GlobalUses {
         if !is_whole {
             return findings;
         }
+        for used in std::mem::take(&mut self.operations.uses) {
+            let function = FunctionName::plain(&used.operation);
+            if self.operations.include(environment, &used.operation) {
+                let known = self.known(environment, &function).filter(|_| !used.is_guarded);
+                let list = known.and_then(|known| known.lambda_list);
+                findings.diagnostics.extend(list.and_then(|list| used.unknown_parameter(&list)));
+            } else if self.functions.contains_key(&function)
+                || self.macros.contains_key(&used.operation)
+                || !matches!(global(environment, &function), GlobalFunction::Undefined)
+            {
+                if !used.is_guarded {
+                    findings.diagnostics.push(self.with_maker(used.not_an_operation(), &used.place));
+                }
+            } else {
+                let index = *known.entry(function.clone()).or_insert(undefined.len());
+                match undefined.get_mut(index) {
+                    Some((_, uses)) => uses.push(used.place),
+                    None => undefined.push((function, vec![used.place])),
+                }
+            }
+        }
         let mut similar = Similar { environment, left: COMPARED };
         let mut reported = FxHashSet::default();
         for (cause, span) in std::mem::take(&mut self.causes) {
@@ -222,13 +243,11 @@ impl GlobalUses {
 
     /// Warns of recovery procedures that call an operation which the interrupted form performs.
     fn check_traps(&mut self, environment: &dyn Environment, findings: &mut Vec<Diagnostic>) {
-        let has = |symbol: &Symbol, indicator: &str| {
-            environment.property(symbol, &Symbol::esl(indicator)).is_some_and(|value| !value.is_nil())
-        };
         for trap in std::mem::take(&mut self.traps) {
-            let operation = &trap.operation;
-            let is_operation = self.operations.contains(operation) || has(operation, "%STARTER");
-            if !is_operation || has(operation, "%EXCLUSIVE") {
+            let (operation, operations) = (&trap.operation, &self.operations);
+            let is_operation = operations.include(environment, operation)
+                || operations.uses.iter().any(|used| used.operation == *operation);
+            if !is_operation || operations.exclude(environment, operation) {
                 continue;
             }
             let shown = name(operation);

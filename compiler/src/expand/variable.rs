@@ -161,8 +161,8 @@ impl Expander {
 
 impl Expander {
     /// Returns the place `span` of a name that is used, and the macro of the program that made the use.
-    pub(super) fn place_of_use(&self, span: Span, to: To) -> NameUsed {
-        let maker = to.origin.filter(|_| !is_known(self.origins.written(span, to.origin)));
+    pub(super) fn place_of_use(&self, span: Span, origin: Option<OriginId>) -> NameUsed {
+        let maker = origin.filter(|_| !is_known(self.origins.written(span, origin)));
         let maker = maker.map(|origin| self.origins.get(origin)).filter(|origin| !origin.is_standard);
         NameUsed { span, maker: maker.map(|origin| origin.name.clone()) }
     }
@@ -173,7 +173,7 @@ impl Expander {
         // The names of a `let` come into scope after all its values.
         let is_bound_later =
             self.jobs.iter().any(|job| matches!(job, Job::Enter(entries) if entries.iter().any(is_entry)));
-        let mut place = self.place_of_use(span, to);
+        let mut place = self.place_of_use(span, to.origin);
         // A symbol that a macro has passed on has lost its place.
         if let Some(origin) = to.origin.filter(|_| !is_known(self.origins.written(span, to.origin)))
             && let Some(written) = self.origins.place_of(symbol, span, origin)

@@ -273,6 +273,7 @@ fn the_programs_in_the_table_of_codes_have_them() {
         "amount-above-capacity",
         "missing-body",
         "concurrent-operation",
+        "not-an-operation",
         "duplicate-definition",
     ];
     let stage = |code: &&&DiagnosticCode| code.stage == Stage::Expander;

@@ -49,8 +49,8 @@ fn first_line(bytes: &[u8]) -> Option<std::ops::Range<usize>> {
     Some(start..if bytes[end - 1] == b'\r' { end - 1 } else { end })
 }
 
-/// Returns false for a line of another version of HTTP. A later version of HTTP 1 is replaced by 1.1, as which
-/// the server understands it.
+/// Returns false for a line of another version of HTTP. A later version of HTTP 1 is replaced by 1.1, which
+/// it includes.
 fn is_known(line: &mut [u8]) -> bool {
     let Some(at) = line.iter().rposition(|&byte| byte == b' ') else { return true };
     match &mut line[at + 1..] {

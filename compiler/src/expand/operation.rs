@@ -1,0 +1,151 @@
+//! Names that have to be those of operations: in `define-exclusive` and `start`.
+//!
+//! UnitOperations are defined by `define-mock`, by the clauses of a `with-world`, and by the host. A name of
+//! nothing may become one before the form is evaluated, as every undefined name may.
+
+use esl_bytecode::compile::Environment;
+use esl_bytecode::datum::Datum;
+use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+use rustc_hash::FxHashSet;
+
+use super::expander::Expander;
+use super::form::{Form, name, operator};
+use super::global::NameUsed;
+use super::origin::OriginId;
+use crate::diagnostic::code;
+use crate::similar::is_like;
+
+/// A form that needs the name of an operation.
+#[derive(Debug)]
+pub(super) struct OperationUse {
+    pub(super) operation: Symbol,
+    pub(super) place: NameUsed,
+    /// The parameter that `define-exclusive` names, and its place.
+    parameter: Option<(Symbol, Span)>,
+    /// Whether a form around it handles failures, so that it may be meant to fail.
+    pub(super) is_guarded: bool,
+}
+
+/// The operations of a unit.
+#[derive(Debug, Default)]
+pub(super) struct UnitOperations {
+    /// Names that the unit defines as those of operations.
+    defined: FxHashSet<Symbol>,
+    /// Names that `define-exclusive` names.
+    exclusive: FxHashSet<Symbol>,
+    /// Forms that need one.
+    pub(super) uses: Vec<OperationUse>,
+}
+
+fn has(environment: &dyn Environment, symbol: &Symbol, indicator: &str) -> bool {
+    environment.property(symbol, &Symbol::esl(indicator)).is_some_and(|value| !value.is_nil())
+}
+
+impl UnitOperations {
+    /// Whether the name is that of an operation.
+    pub(super) fn include(&self, environment: &dyn Environment, symbol: &Symbol) -> bool {
+        self.defined.contains(symbol) || has(environment, symbol, "%STARTER")
+    }
+
+    /// Whether calls of the operation exclude each other.
+    pub(super) fn exclude(&self, environment: &dyn Environment, symbol: &Symbol) -> bool {
+        self.exclusive.contains(symbol) || has(environment, symbol, "%EXCLUSIVE")
+    }
+}
+
+impl OperationUse {
+    /// The warning about the name of a function that is not an operation.
+    pub(super) fn not_an_operation(&self) -> Diagnostic {
+        let message = format!("{} is a function, and not an operation", name(&self.operation));
+        code::NOT_AN_OPERATION
+            .at(self.place.span, message)
+            .help("operations are the functions of the host that wait, and those of `define-mock`")
+    }
+
+    /// The warning about a parameter that the operation, with this lambda list, does not have.
+    pub(super) fn unknown_parameter(&self, lambda_list: &Datum) -> Option<Diagnostic> {
+        let (parameter, span) = self.parameter.as_ref()?;
+        let parameters: Vec<&Symbol> = lambda_list
+            .elements()
+            .filter_map(|item| {
+                // A parameter is written alone, before a default, or in a list after its keyword.
+                let item = item.as_cons().map_or(item, |(head, _)| head);
+                let item = item.elements().nth(1).unwrap_or(item);
+                item.as_symbol().filter(|symbol| !symbol.name().starts_with('&'))
+            })
+            .collect();
+        if parameters.iter().any(|known| known.name() == parameter.name()) {
+            return None;
+        }
+        let message = format!("{} has no parameter {}", name(&self.operation), name(parameter));
+        let warning = code::NOT_AN_OPERATION.at(*span, message);
+        let likely = parameters.iter().find(|known| is_like(known.name(), parameter.name()));
+        Some(match (likely, parameters.as_slice()) {
+            (Some(known), _) => warning.help(format!("did you mean {}?", name(known))),
+            (None, []) => warning.help("it has none"),
+            (None, known) => {
+                let known: Vec<String> = known.iter().map(|known| name(known)).collect();
+                warning.help(format!("it has {}", known.join(", ")))
+            }
+        })
+    }
+}
+
+/// `(define-mock name …)`
+pub(super) fn mock(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
+    if let Some(symbol) = form.args.first().and_then(Datum::as_symbol) {
+        expander.globals.operations.defined.insert(symbol.clone());
+    }
+}
+
+/// `(with-world (clause*) . body)`
+pub(super) fn world(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
+    for clause in form.args.first().into_iter().flat_map(Datum::elements) {
+        let mut parts = clause.elements();
+        let is_answer = parts
+            .next()
+            .and_then(Datum::as_symbol)
+            .is_some_and(|key| key.is_keyword() && matches!(key.name(), "ANSWER" | "NEVER"));
+        if let Some(call) = parts.next().filter(|_| is_answer)
+            && let Some(symbol) = operator(call)
+        {
+            expander.globals.operations.defined.insert(symbol.clone());
+        }
+    }
+}
+
+/// `(start (name …))`
+pub(super) fn start(expander: &mut Expander, _: &dyn Environment, form: &Form, origin: Option<OriginId>) {
+    if let Some((named, _)) = form.args.first().and_then(Datum::as_cons)
+        && let Some(symbol) = named.as_symbol()
+    {
+        expander.note_operation(symbol, form.at(named.span()), None, origin);
+    }
+}
+
+/// `(define-exclusive name [parameter])`
+pub(super) fn exclusive(expander: &mut Expander, _: &dyn Environment, form: &Form, origin: Option<OriginId>) {
+    let Some((named, rest)) = form.args.split_first() else { return };
+    let Some(symbol) = named.as_symbol() else { return };
+    expander.globals.operations.exclusive.insert(symbol.clone());
+    let parameter = rest.first().filter(|parameter| !parameter.is_nil());
+    let parameter =
+        parameter.and_then(|parameter| Some((parameter.as_symbol()?.clone(), form.at(parameter.span()))));
+    expander.note_operation(symbol, form.at(named.span()), parameter, origin);
+}
+
+impl Expander {
+    fn note_operation(
+        &mut self,
+        symbol: &Symbol,
+        span: Span,
+        parameter: Option<(Symbol, Span)>,
+        origin: Option<OriginId>,
+    ) {
+        let place = self.place_of_use(span, origin);
+        let (operation, is_guarded) = (symbol.clone(), self.is_guarded(span));
+        self.globals.operations.uses.push(OperationUse { operation, place, parameter, is_guarded });
+    }
+}
