@@ -196,6 +196,11 @@ fn command(
     environment: Vec<(String, String)>,
 ) -> Result<Command, HostFailure> {
     let unknown = || process_failure(format!("there is no program `{name}`"));
+    // The system would take another name for it, and nothing behind the character 0.
+    let is_variable = |name: &str| !name.is_empty() && !name.contains(['=', '\0']);
+    if let Some((name, _)) = environment.iter().find(|(name, _)| !is_variable(name)) {
+        return Err(process_failure(format!("`{}` cannot be the name of a variable", name.escape_debug())));
+    }
     let mut command = Command::new(find_program(name).ok_or_else(unknown)?);
     // The program sees the name under which it was called as argument 0, not the path that was found.
     #[cfg(unix)]
@@ -212,7 +217,7 @@ fn start(mut command: Command, name: &str) -> Result<Child, HostFailure> {
         // The system does not say which of the two is not there.
         let folder = command.as_std().get_current_dir().filter(|folder| !folder.is_dir());
         let place =
-            folder.map_or(String::new(), |folder| format!(" in {}, which is no folder", folder.display()));
+            folder.map_or(String::new(), |folder| format!(" in {}, which is not a folder", folder.display()));
         process_failure(format!("`{name}` cannot be run{place}: {error}"))
     })
 }
