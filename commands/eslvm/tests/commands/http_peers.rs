@@ -16,7 +16,6 @@ fn curl_is_answered() {
         crate::say_left_out("it needs `curl`");
         return;
     }
-    let folder = Folder::new("http-curl");
     let routes = r#"
     (:get "/hello/:name" (name) (format nil "hello ~a" name))
     (:post "/echo" () (http:request-body http:*request*))
@@ -24,13 +23,14 @@ fn curl_is_answered() {
     (:get "/long" () (make-string 1000000 :initial-element #\x))
     (:get "/away" () (values "" 302 '(("Location" . "/hello/again"))))
     (:put "/length" () (format nil "~d" (length (http:request-body http:*request*))))"#;
-    let served = Served::begin(&folder, "", routes);
-    folder.file("body", "y".repeat(3_000_000));
+    let served = Served::begin("http-curl", "", routes);
+    served.folder.file("body", "y".repeat(3_000_000));
     let url = |path: &str| format!("http://127.0.0.1:{}{path}", served.port);
     let curl = |arguments: &[&str]| {
         let mut command = Command::new("curl");
         command.args(["--silent", "--show-error", "--noproxy", "*", "--max-time", "60"]).args(arguments);
-        let output = command.current_dir(folder.path()).stdin(Stdio::null()).output().expect("curl runs");
+        let output =
+            command.current_dir(served.folder.path()).stdin(Stdio::null()).output().expect("curl runs");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success(), "{arguments:?}: {text}{}", String::from_utf8_lossy(&output.stderr));
         text

@@ -10,21 +10,23 @@ use esl_conformance::process::{self, Finished};
 
 use crate::eslvm;
 
-/// A program that serves until it reads a line.
+/// A program that serves until it reads a line, in a folder of its own.
 pub(crate) struct Served {
+    pub(crate) folder: Folder,
     child: Child,
     pub(crate) port: u16,
     said: BufReader<std::process::ChildStdout>,
 }
 
 impl Served {
-    /// Begins a program with these definitions and routes.
-    pub(crate) fn begin(folder: &Folder, definitions: &str, routes: &str) -> Served {
-        Served::begin_with(folder, "", definitions, routes)
+    /// Begins a program with these definitions and routes, for this test.
+    pub(crate) fn begin(test: &str, definitions: &str, routes: &str) -> Served {
+        Served::begin_with(test, "", definitions, routes)
     }
 
     /// Begins one with these options.
-    fn begin_with(folder: &Folder, options: &str, definitions: &str, routes: &str) -> Served {
+    fn begin_with(test: &str, options: &str, definitions: &str, routes: &str) -> Served {
+        let folder = Folder::new(test);
         let text = format!(
             "(require :http)
 {definitions}
@@ -39,7 +41,7 @@ impl Served {
         let mut said = BufReader::new(child.stdout.take().expect("it is a pipe"));
         let mut port = String::new();
         said.read_line(&mut port).expect("the port is printed");
-        Served { child, port: port.trim().parse().expect("it is a port"), said }
+        Served { folder, child, port: port.trim().parse().expect("it is a port"), said }
     }
 
     pub(crate) fn connect(&self) -> TcpStream {
@@ -246,8 +248,7 @@ const REQUESTS: &[(&str, &str, &[&str])] = &[
 
 #[test]
 fn requests_are_answered_as_the_standard_says() {
-    let folder = Folder::new("http-requests");
-    let served = Served::begin(&folder, "", ROUTES);
+    let served = Served::begin("http-requests", "", ROUTES);
     let mut wrong = Vec::new();
     for (section, request, expected) in REQUESTS {
         let found = answers(&served.ask(request.replace("END", END).as_bytes()));
@@ -265,8 +266,7 @@ fn requests_are_answered_as_the_standard_says() {
 
 #[test]
 fn heads_and_bodies_have_limits() {
-    let folder = Folder::new("http-limits");
-    let served = Served::begin(&folder, "", ROUTES);
+    let served = Served::begin("http-limits", "", ROUTES);
     let ask = |request: String| answers(&served.ask(request.as_bytes()));
     let head = |more: &str| format!("GET /hello/a HTTP/1.1\r\nHost: x\r\n{more}\r\n");
     let long = |size: usize| "x".repeat(size);
@@ -291,8 +291,7 @@ fn bodies_are_bytes_and_texts() {
     let routes = r#"
     (:post "/bytes" () (http:request-bytes http:*request*))
     (:post "/text" () (let ((text (http:request-body http:*request*))) (format nil "~d ~a" (length text) text)))"#;
-    let folder = Folder::new("http-bodies");
-    let served = Served::begin(&folder, "", routes);
+    let served = Served::begin("http-bodies", "", routes);
     let post = |path: &str, body: &[u8]| {
         let head = format!(
             "POST {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: {}\r\n\r\n",
@@ -319,8 +318,7 @@ fn bodies_are_bytes_and_texts() {
 #[cfg(target_os = "linux")]
 #[test]
 fn an_address_has_a_limit_of_connections() {
-    let folder = Folder::new("http-addresses");
-    let served = Served::begin_with(&folder, ":per-address 3", "", ROUTES);
+    let served = Served::begin_with("http-addresses", ":per-address 3", "", ROUTES);
     let ask = |from: [u8; 4]| {
         let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None);
         let socket = socket.expect("there are sockets");
@@ -351,13 +349,12 @@ fn an_address_has_a_limit_of_connections() {
 /// answer.
 #[test]
 fn a_request_ends_with_its_client() {
-    let folder = Folder::new("http-gone");
     let routes = r#"
     (:get "/wait" () (unwind-protect (progn (say "begun") (sleep 600) "late") (say "ended")))
     (:get "/soon" () (sleep 0.5) "soon")
     (:get "/end" () "end")"#;
     let mut served =
-        Served::begin(&folder, "(defun say (text) (format t \"~a~%\" text) (finish-output))", routes);
+        Served::begin("http-gone", "(defun say (text) (format t \"~a~%\" text) (finish-output))", routes);
     let request = b"GET /wait HTTP/1.1\r\nHost: x\r\n\r\n";
     let mut client = served.connect();
     client.write_all(request).expect("it can be sent");
@@ -428,8 +425,7 @@ fn the_last_answer_is_sent() {
 /// Many clients that say nothing take no place from others, and are let go after a while.
 #[test]
 fn silent_clients_delay_nobody() {
-    let folder = Folder::new("http-silent");
-    let served = Served::begin(&folder, "", ROUTES);
+    let served = Served::begin("http-silent", "", ROUTES);
     let mut silent: Vec<TcpStream> = (0..200).map(|_| served.connect()).collect();
     for (index, stream) in silent.iter_mut().enumerate() {
         stream.write_all(&b"GET /hello/a HT"[..index % 16]).expect("it can be sent");

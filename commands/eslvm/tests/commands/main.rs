@@ -1,6 +1,9 @@
 //! The command `eslvm`, run as a process, also with programs that `eslc` compiles: exit statuses, outputs,
 //! files.
 
+#[macro_use]
+mod listed;
+
 #[cfg(unix)]
 mod attach;
 #[cfg(unix)]
@@ -21,6 +24,7 @@ mod http_peers;
 mod http_server;
 #[cfg(unix)]
 mod lines;
+mod manual;
 #[cfg(target_os = "linux")]
 mod memory;
 mod missions;
@@ -55,6 +59,8 @@ mod terminal;
 mod testing;
 mod timeline;
 mod traces;
+mod transcripts;
+mod tutorial;
 #[cfg(unix)]
 mod world;
 

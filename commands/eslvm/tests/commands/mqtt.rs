@@ -21,13 +21,25 @@ impl Drop for Broker {
     }
 }
 
-pub(crate) fn broker_program() -> Option<&'static str> {
+fn broker_program() -> Option<&'static str> {
     let is_there = |name: &&str| Command::new(name).arg("-h").output().is_ok();
     ["mosquitto", "/usr/sbin/mosquitto"].into_iter().find(is_there)
 }
 
+/// Begins a test with a broker of its own, with more settings: its folder, the broker, and its port. `None`,
+/// after saying so, if this machine has no broker.
+pub(crate) fn with_broker(test: &str, more: &str) -> Option<(Folder, Broker, u16)> {
+    let Some(program) = broker_program() else {
+        crate::say_left_out("it needs `mosquitto`");
+        return None;
+    };
+    let folder = Folder::new(test);
+    let (broker, port) = start_broker(program, &folder, more);
+    Some((folder, broker, port))
+}
+
 /// Starts a broker on a free port of the loopback, and waits until it listens.
-pub(crate) fn start_broker(program: &str, folder: &Folder, more: &str) -> (Broker, u16) {
+fn start_broker(program: &str, folder: &Folder, more: &str) -> (Broker, u16) {
     for _ in 0..20 {
         // The port is free until another process takes it, in which case the broker ends.
         let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
@@ -65,12 +77,7 @@ pub(crate) fn printed_by(folder: &Folder, program: &str, port: u16) -> Vec<Strin
 
 #[test]
 fn messages_go_through_a_broker() {
-    let Some(program) = broker_program() else {
-        crate::say_left_out("it needs `mosquitto`");
-        return;
-    };
-    let folder = Folder::new("mqtt");
-    let (_broker, port) = start_broker(program, &folder, "");
+    let Some((folder, _broker, port)) = with_broker("mqtt", "") else { return };
     let text = "(require :mqtt)
 (defmacro cause (form) `(print (handler-case ,form (failure (f) (failure-cause f)))))
 (defvar *port* (parse-integer (first (command-line-arguments))))
@@ -285,12 +292,7 @@ fn a_broker_may_send_anything_or_nothing() {
 /// The last will of a client is published when the client is killed, and not when it ends.
 #[test]
 fn the_last_will_of_a_client_that_is_killed_is_published() {
-    let Some(program) = broker_program() else {
-        crate::say_left_out("it needs `mosquitto`");
-        return;
-    };
-    let folder = Folder::new("mqtt-will");
-    let (_broker, port) = start_broker(program, &folder, "");
+    let Some((folder, _broker, port)) = with_broker("mqtt-will", "") else { return };
     let number = port.to_string();
     let text = "(require :mqtt)
 (mqtt:with-client (c \"127.0.0.1\" (parse-integer (first (command-line-arguments)))
@@ -323,12 +325,7 @@ fn the_last_will_of_a_client_that_is_killed_is_published() {
 
 #[test]
 fn a_connection_that_is_lost_is_made_again() {
-    let Some(program) = broker_program() else {
-        crate::say_left_out("it needs `mosquitto`");
-        return;
-    };
-    let folder = Folder::new("mqtt-lost");
-    let (mut broker, port) = start_broker(program, &folder, "");
+    let Some((folder, mut broker, port)) = with_broker("mqtt-lost", "") else { return };
     let text = "(require :mqtt)
 (defun mark (name) (with-open-file (s name :direction :output) (write-line name s)))
 (mqtt:with-client (c \"127.0.0.1\" (parse-integer (first (command-line-arguments))))
@@ -356,8 +353,12 @@ fn a_connection_that_is_lost_is_made_again() {
     broker.0.kill().and_then(|()| broker.0.wait()).expect("it is our child");
     await_file("lost");
     let settings = folder.path().join("broker.conf");
-    let again =
-        Command::new(program).arg("-c").arg(settings).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let again = Command::new(broker_program().expect("it was there"))
+        .arg("-c")
+        .arg(settings)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
     broker.0 = again.expect("the broker can be started");
     let output = process::finish(child).quiet_output().expect("nothing is wrong");
     assert_eq!(output.split_whitespace().collect::<Vec<_>>(), [":CONNECTION-LOST", "AGAIN"]);

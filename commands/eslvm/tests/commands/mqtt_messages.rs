@@ -8,17 +8,12 @@ use esl_conformance::folder::Folder;
 use esl_conformance::process;
 
 use crate::eslvm;
-use crate::mqtt::{broker_program, printed_by, read_packet, start_broker};
+use crate::mqtt::{printed_by, read_packet, with_broker};
 
 /// Topics that begin with `$` are for filters that say so. What the protocol does not allow is not sent.
 #[test]
 fn wildcards_leave_out_the_topics_of_the_broker() {
-    let Some(program) = broker_program() else {
-        crate::say_left_out("it needs `mosquitto`");
-        return;
-    };
-    let folder = Folder::new("mqtt-topics");
-    let (_broker, port) = start_broker(program, &folder, "");
+    let Some((folder, _broker, port)) = with_broker("mqtt-topics", "") else { return };
     let text = "(require :mqtt)
 (defmacro fault (form)
   `(print (handler-case (progn ,form :sent)
@@ -149,12 +144,7 @@ fn a_message_of_level_2_that_is_repeated_is_delivered_once() {
 /// program can publish, though what acknowledges that comes behind the messages that it has not taken.
 #[test]
 fn messages_that_nobody_takes_hold_up_neither_the_connection_nor_publishing() {
-    let Some(program) = broker_program() else {
-        crate::say_left_out("it needs `mosquitto`");
-        return;
-    };
-    let folder = Folder::new("mqtt-full");
-    let (_broker, port) = start_broker(program, &folder, "max_queued_messages 0\n");
+    let Some((folder, _broker, port)) = with_broker("mqtt-full", "max_queued_messages 0\n") else { return };
     let text = "(require :mqtt)
 (defvar *port* (parse-integer (first (command-line-arguments))))
 (mqtt:with-client (c \"127.0.0.1\" *port* :keep-alive 1 :will '(\"lost\" \"c\"))

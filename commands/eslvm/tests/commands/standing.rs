@@ -138,7 +138,7 @@ fn many_facts_are_shown_by_pages() {
         (":facts mode", 1, "(MODE CALM)"),
         (":data", 2, "relation SEEN/1: 1203 facts"),
         // A mistake in a command is reported in the words of that command.
-        (":bt two", 1, "; `:bt` needs the number of a task, which `:tasks` shows, or nothing"),
+        (":bt two", 1, "; `:bt` needs the number of a task, which `:tasks` shows, or `full`, or nothing"),
         (":resume", 1, "; `:resume` needs the number of a task, which `:tasks` shows"),
         (":suspend 99", 1, "; task 99 does not exist"),
         (":watch", 1, "; `:watch` needs a form"),
@@ -148,5 +148,33 @@ fn many_facts_are_shown_by_pages() {
         let said: Vec<&str> = said.lines().collect();
         assert_eq!((said.len(), said.last().copied()), (lines, Some(last)), "{command}");
     }
+    assert_eq!(run.end(), Some(0));
+}
+
+/// A failure that a recovery procedure recovers from at once has arguments, too; one of the session is shown
+/// with all calls of the library on request.
+#[test]
+fn failures_are_shown_with_their_arguments_and_calls() {
+    let folder = Folder::new("standing_failures");
+    let socket = folder.join("s");
+    let program = "(defun probe (list) (mapcar (lambda (x) (fail :broken x \"deep\")) list))
+(print (with-recovery-procedures ((:broken (abort 'recovered))) (probe '(1 2))))
+(format *error-output* \"recovered~%\")
+(read-line *standard-input* nil)";
+    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
+    run.said("; operators attach with eslvm attach ");
+    run.said("recovered");
+    let typed = ":failures\n:bt full\n(probe (list 3))\n:bt full\n(car 5)\n:bt full\n";
+    let said = process::run(&mut eslvm(&["attach", &socket]), typed).output;
+    let lines: Vec<&str> = said.lines().collect();
+    assert!(lines[0].contains(" the main task :BROKEN 1, \"deep\", "), "{said}");
+    assert_eq!(lines[1], "Nothing has failed here; `:failures` shows the failures of the run.");
+    let report = lines.iter().position(|line| *line == "A failure of cause :BROKEN with 3, \"deep\".");
+    let report = &lines[report.expect("it is shown")..];
+    assert!(report[1].starts_with("  in (LAMBDA), "), "{said}");
+    assert!(report[2].starts_with("  in MAPCAR, stdlib/lists.esl:"), "{said}");
+    assert!(report.iter().any(|line| line.starts_with("  in ESL::%CALL-IN-SESSION, stdlib/")), "{said}");
+    let last = lines.iter().rposition(|line| *line == "The value 5 is not of type LIST.");
+    assert_eq!(lines[last.expect("it is shown") + 1], "  in top level", "{said}");
     assert_eq!(run.end(), Some(0));
 }

@@ -84,71 +84,96 @@ impl Session {
         let output = Output::of(person.try_clone().expect("it can be shared"));
         Session { person, terminal, before, child, output }
     }
-}
 
-/// Waits until a session has ended, and returns its exit status.
-fn status(child: &mut Child) -> Option<i32> {
-    let mut ended = None;
-    until("the end of the session", || {
-        ended = child.try_wait().expect("it can be asked");
-        ended.is_some()
-    });
-    ended.and_then(|status| status.code())
+    /// Types a text.
+    fn types(&mut self, text: &str) {
+        self.person.write_all(text.as_bytes()).expect("it is read");
+    }
+
+    /// Waits until the session shows texts, one after the other.
+    fn shows(&mut self, texts: &[&str]) {
+        texts.iter().for_each(|text| self.output.await_text(text));
+    }
+
+    /// Types a text when the prompt is there.
+    fn answers(&mut self, text: &str) {
+        self.shows(&["? "]);
+        self.types(text);
+    }
+
+    /// Waits until the session has ended, and returns its exit status.
+    fn status(&mut self) -> Option<i32> {
+        let mut ended = None;
+        until("the end of the session", || {
+            ended = self.child.try_wait().expect("it can be asked");
+            ended.is_some()
+        });
+        ended.and_then(|status| status.code())
+    }
 }
 
 /// It does so while the next line is edited, and leaves the terminal as it was.
 #[test]
 fn a_task_ends_the_session_at_once() {
-    let Session { mut person, terminal, before, mut child, mut output } = Session::begin();
-    output.await_text("? ");
-    let form =
-        "(progn (spawn (sleep 0.2) (unwind-protect (exit 7) (print (list 'cleaned 'up)))) (list 'go))\r";
-    person.write_all(form.as_bytes()).expect("it is read");
-    output.await_text("(GO)");
-    assert_eq!(status(&mut child), Some(7));
-    output.await_text("(CLEANED UP)");
-    let after = tcgetattr(&terminal).expect("it is still a terminal");
+    let mut session = Session::begin();
+    session.answers(
+        "(progn (spawn (sleep 0.2) (unwind-protect (exit 7) (print (list 'cleaned 'up)))) (list 'go))\r",
+    );
+    session.shows(&["(GO)"]);
+    assert_eq!(session.status(), Some(7));
+    session.shows(&["(CLEANED UP)"]);
+    let (before, after) = (&session.before, tcgetattr(&session.terminal).expect("it is still a terminal"));
     assert_eq!((after.local_modes, after.input_modes), (before.local_modes, before.input_modes));
 }
 
 /// It is all evaluated, although the terminal delivers it in large pieces.
 #[test]
 fn what_is_typed_ahead_is_kept() {
-    let Session { mut person, mut child, mut output, .. } = Session::begin();
-    output.await_text("? ");
-    let forms: String = (0..200).map(|n| format!("(list 'form {n})\r")).collect();
-    person.write_all(forms.as_bytes()).expect("it is read");
+    let mut session = Session::begin();
+    session.answers(&(0..200).map(|n| format!("(list 'form {n})\r")).collect::<String>());
     for n in 0..200 {
-        output.await_text(&format!("(FORM {n})"));
+        session.shows(&[&format!("(FORM {n})")]);
     }
-    person.write_all(b"(exit 3)\r").expect("it is read");
-    assert_eq!(status(&mut child), Some(3));
+    session.types("(exit 3)\r");
+    assert_eq!(session.status(), Some(3));
 }
 
 /// TAB lists the names that a word can become, with what there is to say about them, and completes it when
 /// there is one only.
 #[test]
 fn a_word_is_completed() {
-    let Session { mut person, mut child, mut output, .. } = Session::begin();
-    output.await_text("; :help lists the commands, TAB completes, Ctrl-D ends");
-    output.await_text("? ");
-    let mut write = |text: &str| person.write_all(text.as_bytes()).expect("it is read");
-    write("(list 'wait-for-\t");
-    output.await_text("wait-for-event");
-    output.await_text("Waits until one of");
-    output.await_text("wait-for-task");
-    write("tas\t)\r");
-    output.await_text("(WAIT-FOR-TASK)");
-    write("(defun my-own-function () \"Does what is mine.\" 1)\r");
-    output.await_text("MY-OWN-FUNCTION");
-    write("(my-o\t)\r");
-    output.await_text("1");
-    write(":tas\t\r");
-    output.await_text("No tasks.");
-    write("help\r");
-    output.await_text(":load FILE");
-    write("exit\r");
-    assert_eq!(status(&mut child), Some(0));
+    let mut session = Session::begin();
+    session.shows(&["; :help lists the commands, TAB completes, Ctrl-D ends"]);
+    session.answers("(list 'wait-for-\t");
+    session.shows(&["wait-for-event", "Waits until one of", "wait-for-task"]);
+    session.types("tas\t)\r");
+    session.shows(&["(WAIT-FOR-TASK)"]);
+    session.types("(defun my-own-function () \"Does what is mine.\" 1)\r");
+    session.shows(&["MY-OWN-FUNCTION"]);
+    session.types("(my-o\t)\r");
+    session.shows(&["1"]);
+    session.types(":tas\t\r");
+    session.shows(&["No tasks."]);
+    session.types("help\r");
+    session.shows(&[":load FILE"]);
+    session.types(":exit\r");
+    assert_eq!(session.status(), Some(0));
+}
+
+/// The prompt has the number of forms that wait for the choice of a restart.
+#[test]
+fn forms_that_wait_are_counted_in_the_prompt() {
+    let mut session = Session::begin();
+    session.answers("(list (cerror \"Go on.\" \"stuck\") 'after)\r");
+    session.shows(&["stuck", "0: (CONTINUE) Go on.", "1? "]);
+    session.types("(list (cerror \"Go on.\" \"stuck\") 'again)\r");
+    session.shows(&["0: (CONTINUE) Go on.", "2? "]);
+    session.types(":restart continue\r");
+    session.shows(&["(NIL AGAIN)", "1? "]);
+    session.types(":restart 0\r");
+    session.shows(&["(NIL AFTER)"]);
+    session.answers("\x04");
+    assert_eq!(session.status(), Some(0));
 }
 
 #[test]
@@ -158,26 +183,22 @@ fn sessions_elsewhere_are_edited_too() {
     let program = "(defun drive-home () 7) (read-line *standard-input* nil)";
     let mut run = Operated::start(&folder, program, &["--listen", &socket, "--record", &recording]);
     run.said("; operators attach with eslvm attach ");
-    let Session { mut person, mut child, mut output, .. } = Session::of(&["attach", &socket]);
-    output.await_text("; :help lists the commands");
-    output.await_text("? ");
-    person.write_all(b"(list (drive-h\t))\r").expect("it is read");
-    output.await_text("(7)");
-    person.write_all(b":undo\t\r").expect("it is read");
-    output.await_text("; no patch can be undone");
+    let mut session = Session::of(&["attach", &socket]);
+    session.shows(&["; :help lists the commands"]);
+    session.answers("(list (drive-h\t))\r");
+    session.shows(&["(7)"]);
+    session.types(":undo\t\r");
+    session.shows(&["; no patch can be undone"]);
     // Before the next line is asked for, the terminal itself takes Ctrl-D for the end of an empty input.
-    output.await_text("? ");
-    person.write_all(b"\x04").expect("it is read");
-    assert_eq!(status(&mut child), Some(0));
+    session.answers("\x04");
+    assert_eq!(session.status(), Some(0));
     assert_eq!(run.end(), Some(0));
-    let Session { mut person, mut child, mut output, .. } =
-        Session::of(&["replay", "--until", "tick:0", &recording]);
-    output.await_text("(replay) ");
-    person.write_all(b"whe\t\r").expect("it is read");
-    output.await_text(": between two turns");
-    person.write_all(b"stpe\r").expect("it is read");
-    output.await_text("Unknown command `stpe`; did you mean `step`?");
-    output.await_text("(replay) ");
-    person.write_all(b"\x04").expect("it is read");
-    assert_eq!(status(&mut child), Some(0));
+    let mut session = Session::of(&["replay", "--until", "tick:0", &recording]);
+    session.shows(&["(replay) "]);
+    session.types("whe\t\r");
+    session.shows(&[": between two turns"]);
+    session.types("stpe\r");
+    session.shows(&["Unknown command `stpe`; did you mean `step`?", "(replay) "]);
+    session.types("\x04");
+    assert_eq!(session.status(), Some(0));
 }

@@ -45,6 +45,8 @@ fn calls_of_the_library_are_shown_on_request() {
     let (status, full) = test(&folder, &["--full", "sort.esl"]);
     assert_eq!(status, Some(1), "{full}");
     assert!(full.contains("  in STABLE-SORT, stdlib/sort.esl:"), "{full}");
+    let frames: Vec<&str> = full.lines().map(str::trim).filter(|line| line.starts_with("in ")).collect();
+    assert!(frames[0].starts_with("in (LAMBDA), sort.esl:1:"), "{frames:#?}");
 }
 
 #[test]

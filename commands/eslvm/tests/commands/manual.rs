@@ -2,40 +2,70 @@
 //! `README.md`, run by the commands; `conformance/src/chapter.rs` describes their form.
 
 use std::path::Path;
-use std::process::Command;
 
 use esl_conformance::chapter::{Example, examples};
 use esl_conformance::process;
 use esl_conformance::transcript::{Transcript, compare};
-use libtest_mimic::{Arguments, Failed, Trial};
+
+use crate::listed;
 
 /// Printed before each piece of a program, with its number.
 const MARK: &str = "@@ piece ";
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let root = esl_conformance::root();
-    let mut paths = vec![root.join("README.md")];
-    for folder in ["docs/manual", "docs/cookbook", "docs/coming-from"] {
-        for entry in std::fs::read_dir(root.join(folder)).expect("the documentation is there") {
-            paths.push(entry.expect("the folder can be read").path());
-        }
+mod chapters {
+    test_files! { super::check, "docs/manual", "md":
+        readme = "README.md",
+        base_language = "base-language.md",
+        coordination = "coordination.md",
+        database = "database.md",
+        embedding = "embedding.md",
+        failure = "failure.md",
+        goals = "goals.md",
+        modules = "modules.md",
+        operate = "operate.md",
+        property_locks = "property-locks.md",
+        reference = "reference.md",
+        repl = "repl.md",
+        replay = "replay.md",
+        tasks = "tasks.md",
+        testing = "testing.md",
+        tools = "tools.md",
+        world = "world.md",
     }
-    let mut trials = Vec::new();
-    for path in paths {
-        if path.extension().is_some_and(|extension| extension == "md") {
-            let name = path.strip_prefix(root).unwrap_or(&path).with_extension("").display().to_string();
-            let chapter = name.clone();
-            trials.push(Trial::test(name, move || check(&chapter, &std::fs::read_to_string(&path)?)));
-        }
-    }
-    libtest_mimic::run(&arguments, trials).exit();
 }
 
-fn check(name: &str, markdown: &str) -> Result<(), Failed> {
+mod cookbook {
+    test_files! { super::check, "docs/cookbook", "md":
+        readme = "README.md",
+        coordination = "coordination.md",
+        data = "data.md",
+        failures = "failures.md",
+        knowledge = "knowledge.md",
+        tasks = "tasks.md",
+        tests = "tests.md",
+    }
+}
+
+mod coming_from {
+    test_files! { super::check, "docs/coming-from", "md":
+        readme = "README.md",
+        behaviour_trees = "behaviour-trees.md",
+        common_lisp = "common-lisp.md",
+        erlang = "erlang.md",
+        plexil = "plexil.md",
+        python = "python.md",
+    }
+}
+
+#[test]
+fn readme() {
+    listed::run("README.md", check);
+}
+
+fn check(path: &str, markdown: &str) -> Result<(), String> {
     let mut program = String::new();
     let mut outputs: Vec<(usize, Option<String>)> = Vec::new();
-    for (line, example) in examples(markdown)? {
+    for (line, example) in examples(markdown).map_err(|fault| fault.to_string())? {
         match example {
             Example::Program { text, output } => {
                 let number = outputs.len();
@@ -68,19 +98,19 @@ fn check(name: &str, markdown: &str) -> Result<(), Failed> {
         compare(expected, &plain).map_err(|text| format!("the program on line {line}: {text}"))?;
     }
     if program.contains("(deftest ") {
-        let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.esl", name.replace('/', "-")));
-        std::fs::write(&file, &program)?;
+        let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.esl", path.replace('/', "-")));
+        std::fs::write(&file, &program).map_err(|error| error.to_string())?;
         let told = eslvm(&["test", &file.to_string_lossy()], "")?;
         if !told.trim_end().ends_with(" 0 failed") {
-            return Err(told.into());
+            return Err(told);
         }
     }
     Ok(())
 }
 
 /// Returns what a command writes when `input` is typed.
-fn eslvm(arguments: &[&str], input: &str) -> Result<String, Failed> {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_eslvm"));
-    command.args(arguments).current_dir(esl_conformance::root()).env("ESL_LIBRARY", "examples/library");
-    Ok(process::run(&mut command, input).quiet_output().map_err(|text| format!("{arguments:?}: {text}"))?)
+fn eslvm(arguments: &[&str], input: &str) -> Result<String, String> {
+    let mut command = crate::eslvm(arguments);
+    command.current_dir(esl_conformance::root()).env("ESL_LIBRARY", "examples/library");
+    process::run(&mut command, input).quiet_output().map_err(|text| format!("{arguments:?}: {text}"))
 }

@@ -35,7 +35,7 @@ fn blocks(markdown: &str) -> Vec<Block<'_>> {
 
 /// Returns the path of the folder of the commands under test in front of the search path.
 fn search_path() -> std::ffi::OsString {
-    let commands = Path::new(env!("CARGO_BIN_EXE_eslvm")).parent().expect("the command is in a folder");
+    let commands = Path::new(crate::ESLVM).parent().expect("the command is in a folder");
     let others = std::env::var_os("PATH").unwrap_or_default();
     let folders = std::iter::once(commands.to_path_buf()).chain(std::env::split_paths(&others));
     std::env::join_paths(folders).expect("the folders have plain names")
