@@ -11,8 +11,9 @@
 //! X
 //! ```
 //!
-//! A line that begins with `? ` is typed, and so are the lines after it until its parentheses are closed. The
-//! text up to the next such line is the answer. Trailing blanks and empty lines at the very end are ignored.
+//! A line that begins with `? `, or a number before that, is typed, and so are the lines after it until its
+//! parentheses are closed. The text up to the next such line is the answer. Trailing blanks and empty lines
+//! at the very end are ignored.
 
 use std::fmt;
 
@@ -53,7 +54,9 @@ impl Transcript {
         let mut form = String::new();
         let mut has_begun = false;
         for line in text.lines() {
-            let prompted = line.strip_prefix("? ").or((line == "?").then_some(""));
+            // While forms wait for the choice of a restart, their number is in the prompt.
+            let prompt = line.trim_start_matches(|c: char| c.is_ascii_digit());
+            let prompted = prompt.strip_prefix("? ").or((prompt == "?").then_some(""));
             if !is_typed && let Some(typed) = prompted {
                 has_begun = true;
                 form.clear();

@@ -108,6 +108,8 @@ pub enum Answer {
         message: String,
         /// Report of the failure, with its places.
         report: String,
+        /// The same with all calls of the library, if it was kept.
+        full_report: Option<String>,
         /// Arguments of the failure, if its cause is one of the program's.
         arguments: Vec<Datum>,
         /// The calls that it has left unfinished, innermost first.

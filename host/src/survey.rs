@@ -185,6 +185,8 @@ pub struct FailureRow {
     pub place: Option<String>,
     /// The report, if it has ended the task.
     pub report: Option<String>,
+    /// The report with all calls of the library, if that was kept as well.
+    pub full_report: Option<String>,
     /// The calls that it has left unfinished, innermost first, if it has ended the task: those of the task,
     /// and before them those of the tasks whose failures it has failed with.
     pub frames: Vec<FailureFrame>,

@@ -229,7 +229,7 @@ impl<T> Future for Reply<T> {
 /// Returns the error that an answer without a value stands for.
 fn error_of(answer: Answer) -> Error {
     match answer {
-        Answer::Failed { cause, message, report, arguments, frames } => Error::Failed {
+        Answer::Failed { cause, message, report, arguments, frames, .. } => Error::Failed {
             cause,
             message,
             report,

@@ -259,7 +259,7 @@ impl OperatorSession {
         if answer.name().as_deref() == Some(":left") {
             return Err(OperatorRefusal::Left);
         }
-        if let Some([kind, WireForm::Text(report)]) = answer.items()
+        if let Some([kind, WireForm::Text(report), ..]) = answer.items()
             && kind.name().as_deref() == Some(":failed")
         {
             return Err(OperatorRefusal::Failed(report.lines().next().unwrap_or_default().to_string()));
@@ -393,7 +393,10 @@ impl OperatorSession {
         let mut text = String::new();
         for row in survey.failures {
             let place = row.place.map_or(String::new(), |place| format!(", {place}"));
-            _ = writeln!(text, "{:>10.3} {} {}{place}", row.time as f64 / 1e9, row.name, row.cause);
+            let arguments =
+                if row.arguments.is_empty() { String::new() } else { format!(" {}", row.arguments) };
+            let time = row.time as f64 / 1e9;
+            _ = writeln!(text, "{time:>10.3} {} {}{arguments}{place}", row.name, row.cause);
             row.report
                 .iter()
                 .flat_map(|report| report.lines())
@@ -426,8 +429,10 @@ impl OperatorSession {
         self.open().remove(&number);
         match answer {
             Answer::Values(values) => Ok(values.first().map_or(WireForm::nil(), form_of)),
-            Answer::Failed { report, .. } => {
-                Ok(WireForm::list([WireForm::symbol(":failed"), WireForm::Text(report)]))
+            Answer::Failed { report, full_report, .. } => {
+                let full = full_report.map(WireForm::Text);
+                let reports = [WireForm::symbol(":failed"), WireForm::Text(report)].into_iter().chain(full);
+                Ok(WireForm::list(reports))
             }
             Answer::Aborted => Err(OperatorRefusal::Aborted),
             Answer::Circular | Answer::TooLarge => Err(OperatorRefusal::ValueTooLarge),

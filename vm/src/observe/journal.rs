@@ -50,11 +50,18 @@ impl Journal {
     }
 
     /// Notes the report of the failure that has ended a task: the last one of that task.
-    pub(crate) fn note_end(&mut self, task: u64, report: String, frames: Vec<FailureFrame>) {
+    pub(crate) fn note_end(
+        &mut self,
+        task: u64,
+        report: String,
+        full_report: Option<String>,
+        frames: Vec<FailureFrame>,
+    ) {
         self.ended += 1;
         let last = self.recent.iter().rposition(|row| row.task == task);
         let Some(mut row) = last.and_then(|index| self.recent.remove(index)) else { return };
         row.report = Some(report);
+        row.full_report = full_report;
         row.frames = frames;
         // Viewers that have seen the failure without its report get it again, under a new number.
         self.noted += 1;

@@ -105,6 +105,7 @@ fn note_failure(vm: &mut Vm, cause: &str, condition: Value, arguments: Value) {
         arguments: arguments_label(vm, condition, arguments),
         place: place.map(|place| format!("{}:{}:{}", place.source, place.line, place.column)),
         report: None,
+        full_report: None,
         frames: Vec::new(),
     };
     vm.watch.journal.note_failure(row);
@@ -118,7 +119,8 @@ pub(crate) fn note_end_by_failure(vm: &mut Vm, condition: Value, history: Option
     // A task that belongs to a form has no report, but the history that the form is given.
     let of_history = || history.map(|history| vm.frames_of_history(history, task.object)).unwrap_or_default();
     let frames = report.map_or_else(of_history, |report| report.frames.to_vec());
-    vm.watch.journal.note_end(task.number.0, text, frames);
+    let full = report.and_then(|report| report.full_text());
+    vm.watch.journal.note_end(task.number.0, text, full, frames);
 }
 
 /// Tells observers that the running task fails with a condition, or with a cause and a list of arguments.

@@ -6,13 +6,13 @@ use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::opcode::{CallTarget, Instr};
 
 use super::tasks::place_of;
-use super::{task_label, variable_rows};
+use super::{task_label, variable_rows, with_variables};
 use crate::describe::{describe, function_name};
 use crate::heap::Kind;
 use crate::interp::frames::{Frame, Frames};
 use crate::observe::StandingFrame;
 use crate::schedule::{RunQueues, Timers};
-use crate::task::{Task, TaskNumber, TaskState};
+use crate::task::{Task, TaskId, TaskNumber, TaskState};
 use crate::vm::Vm;
 
 impl Vm {
@@ -55,6 +55,17 @@ impl Vm {
             variables: variable_rows(self, &frame),
         };
         Frames::of_task(task).take(limit).map(row).collect()
+    }
+
+    /// Returns the report of a failure at which a task stands, with the variables of its frames.
+    pub fn report_with_variables(&self, number: TaskNumber, report: &str) -> String {
+        let frames = self.standing(number).map(Frames::of_task).into_iter().flatten();
+        with_variables(self, report, frames)
+    }
+
+    /// Returns the number of a task; `None` if it was forgotten.
+    pub fn number_of(&self, id: TaskId) -> Option<TaskNumber> {
+        self.scheduler.tasks.get(id).map(|task| task.number)
     }
 
     /// Returns the name of the function that a task is about to call, if it stands before a call.

@@ -56,6 +56,7 @@ fn no_call(function: &FunctionRef) -> Answer {
         cause: cause.into(),
         message: message.into(),
         report: String::new(),
+        full_report: None,
         arguments: Vec::new(),
         frames: Vec::new(),
     }
@@ -159,13 +160,14 @@ pub(super) fn answer_call(vm: &mut Vm, end: TaskEnd, values: &[Value]) -> bool {
             let report = extra.and_then(|extra| extra.report.take());
             let message = vm.embedder.last_words.take().unwrap_or_else(|| vm.describe(condition));
             let frames = report.as_ref().map_or(Vec::new(), |report| report.frames.to_vec());
+            let full_report = report.as_ref().and_then(|report| report.full_text());
             let report = report.map_or_else(
                 || report::report_in_short(&vm.heap, condition),
                 |report| report.detailed_text(),
             );
             let (cause, arguments) =
                 (report::cause_label(&vm.heap, condition), report::failure_arguments(vm, condition));
-            Answer::Failed { cause, message, report, arguments, frames }
+            Answer::Failed { cause, message, report, full_report, arguments, frames }
         }
         TaskEnd::Aborted if all_are_to_end(vm) => Answer::Ended,
         TaskEnd::Aborted | TaskEnd::Spent => Answer::Aborted,

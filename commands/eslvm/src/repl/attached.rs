@@ -31,7 +31,11 @@ const HEARING: Duration = Duration::from_secs(1);
 /// The commands.
 const COMMANDS: &[SessionCommand] = &[
     row(&[":tasks"], "", "the tasks of the run, as a tree, with their numbers"),
-    row(&[":bt"], "[N]", "the backtrace of the newest failure, or the activity and the frames of task N"),
+    row(
+        &[":bt"],
+        "[full | N]",
+        "the backtrace of the newest failure, with all calls of the library, or the frames of task N",
+    ),
     row(&[":failures"], "", "the latest failures of the run"),
     row(&[":facts"], "[NAME [N]]", "facts of the database, 500 at a time, after the first N"),
     row(&[":data"], "", "relations, locks of properties, and inputs"),
@@ -186,8 +190,8 @@ struct Attached {
     printer: SessionPrinter,
     /// Number of requests so far.
     asked: i64,
-    /// Report of the last failure.
-    failure: Option<String>,
+    /// Report of the last failure, and that with all calls of the library.
+    failure: Option<(String, String)>,
     /// Why the connection ends.
     end: EndOfSession,
 }
@@ -403,11 +407,12 @@ impl Attached {
             Err(reason) => self.printer.print(&format!("; {reason}\n")),
             Ok(WireForm::Text(text)) => self.printer.print(&text),
             Ok(WireForm::List(items)) => {
-                if let [kind, WireForm::Text(report)] = &items[..]
+                if let [kind, WireForm::Text(report), full @ ..] = &items[..]
                     && kind.name().as_deref() == Some(":failed")
                 {
                     self.printer.print(&in_short(report));
-                    self.failure = Some(report.clone());
+                    let full = full.first().and_then(WireForm::as_text);
+                    self.failure = Some((report.clone(), full.unwrap_or(report).into()));
                 }
             }
             Ok(_) => {}
@@ -419,7 +424,9 @@ impl Attached {
         let number = rest.parse().map(WireForm::Integer).unwrap_or(WireForm::nil());
         let needed = match command {
             ":abort" | ":suspend" | ":resume" => Some("the number of a task, which `:tasks` shows"),
-            ":bt" if !rest.is_empty() => Some("the number of a task, which `:tasks` shows, or nothing"),
+            ":bt" if !matches!(rest, "" | "full") => {
+                Some("the number of a task, which `:tasks` shows, or `full`, or nothing")
+            }
             _ => None,
         };
         if let (Some(needed), false) = (needed, matches!(number, WireForm::Integer(_))) {
@@ -429,8 +436,9 @@ impl Attached {
         let needs = |needed| Err(RequestRefusal::Needs(command.into(), needed));
         let answer = match command {
             ":tasks" => self.ask("esl:tasks", &[])?,
-            ":bt" if rest.is_empty() => {
-                let report = self.failure.clone();
+            ":bt" if matches!(rest, "" | "full") => {
+                let reports = self.failure.clone();
+                let report = reports.map(|(report, full)| if rest.is_empty() { report } else { full });
                 Ok(WireForm::Text(report.unwrap_or_else(|| {
                     "Nothing has failed here; `:failures` shows the failures of the run.\n".into()
                 })))

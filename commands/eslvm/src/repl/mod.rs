@@ -22,6 +22,7 @@ mod attached;
 pub(crate) mod commands;
 pub(crate) mod editor;
 mod foreign;
+mod held;
 pub(crate) mod lines;
 mod refusal;
 pub(crate) mod screen;
@@ -46,6 +47,7 @@ use esl::module_path::ModulePath;
 use esl::program;
 use esl_command::{NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, complain};
 use foreign::foreign;
+use held::HeldFailures;
 use lines::{CompletionRequest, Line, WordCompletion};
 use screen::PromptScreen;
 use typing::Typing;
@@ -53,6 +55,8 @@ pub use wire::AttachSecurity;
 
 /// Prompt for a form.
 const PROMPT: &str = "? ";
+/// Prompts while so many forms wait for the choice of a restart.
+const HELD_PROMPTS: [&str; 10] = [PROMPT, "1? ", "2? ", "3? ", "4? ", "5? ", "6? ", "7? ", "8? ", "9? "];
 /// Prompt for further lines of a form.
 const CONTINUATION: &str = "  ";
 
@@ -63,6 +67,11 @@ const COMMANDS: &[SessionCommand] = &[
         names: &[":bt"],
         arguments: "[full]",
         does: "shows the newest failure, and its frames with their variables, or also those of the library",
+    },
+    SessionCommand {
+        names: &[":restart"],
+        arguments: "[N [ARGUMENT…]]",
+        does: "goes on with the newest form that has failed by a restart, by its number or name; lists them",
     },
     SessionCommand {
         names: &[":tasks"],
@@ -119,7 +128,9 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
     if is_interactive {
         println!("ESL {}; :help lists the commands, TAB completes, Ctrl-D ends", env!("CARGO_PKG_VERSION"));
     }
-    let mut repl = Repl { machine, typing, interrupts, virtual_time, failure: None, full: None };
+    let held_failures = HeldFailures::install(&mut machine);
+    let (failure, held) = (None, Vec::new());
+    let mut repl = Repl { machine, typing, interrupts, virtual_time, failure, held_failures, held };
     repl.call("%REPL-BEGIN", "");
     let status = repl.talk();
     program::end_rest(&mut repl.machine);
@@ -136,10 +147,21 @@ struct Repl {
     interrupts: Interrupts,
     /// Whether time passes only while a form is evaluated.
     virtual_time: bool,
-    /// Report of the last failure of a form, and the number that the journal had given by then.
-    failure: Option<(String, u64)>,
-    /// Its report with all calls of the library, for `:bt full`.
+    /// The last failure of a form.
+    failure: Option<FormFailure>,
+    /// Where forms tell that they wait for the choice of a restart.
+    held_failures: HeldFailures,
+    /// The tasks of forms that do, the newest last.
+    held: Vec<TaskId>,
+}
+
+/// A failure of a form.
+struct FormFailure {
+    report: String,
+    /// The report with all calls of the library.
     full: Option<String>,
+    /// Number that the journal had given by then.
+    noted: u64,
 }
 
 /// The outcome of evaluating a text.
@@ -207,7 +229,8 @@ impl Repl {
     fn talk(&mut self) -> Result<u8, u8> {
         let mut text = String::new();
         loop {
-            let prompt = if text.is_empty() { PROMPT } else { CONTINUATION };
+            self.settle_held();
+            let prompt = if text.is_empty() { HELD_PROMPTS[self.held.len().min(9)] } else { CONTINUATION };
             let line = self.next_line(prompt);
             if let Break(status) = self.unless_exited() {
                 // A background task has asked for the end.
@@ -303,13 +326,12 @@ impl Repl {
                 let bare = path.strip_prefix('"').and_then(|path| path.strip_suffix('"'));
                 self.call("%REPL-LOAD", bare.unwrap_or(path));
             }
-            ":bt" if path.trim() == "full" && self.full.is_some() => {
-                print!("{}", self.full.as_deref().unwrap_or_default());
-            }
             ":bt" => match self.newest_failure() {
-                Some(report) => print!("{report}"),
+                Some((_, Some(full))) if path.trim() == "full" => print!("{full}"),
+                Some((report, _)) => print!("{report}"),
                 None => println!("Nothing has failed."),
             },
+            ":restart" => self.restart(path),
             ":tasks" => print!("{}", self.machine.task_report()),
             ":abort" => self.abort(path),
             _ => print!("{}", help(COMMANDS)),
@@ -333,15 +355,17 @@ impl Repl {
         }
     }
 
-    /// Returns the report of the newest failure that was not recovered from: of a form, or of another task.
-    fn newest_failure(&self) -> Option<String> {
+    /// Returns the report of the newest failure that was not recovered from, of a form or of another task,
+    /// and that with all calls of the library if it was kept.
+    fn newest_failure(&self) -> Option<(String, Option<String>)> {
         let request = SurveyRequest { failures_after: Some(0), ..SurveyRequest::default() };
         let failures = self.machine.survey(&request).failures;
         let newest = failures.into_iter().rev().find(|row| row.report.is_some());
         match (&self.failure, newest) {
-            (Some((_, before)), Some(row)) if row.number > *before => row.report,
-            (Some((report, _)), _) => Some(report.clone()),
-            (None, row) => row?.report,
+            (Some(form), row) if row.as_ref().is_none_or(|row| row.number <= form.noted) => {
+                Some((form.report.clone(), form.full.clone()))
+            }
+            (_, row) => row.and_then(|row| Some((row.report?, row.full_report))),
         }
     }
 
@@ -351,12 +375,12 @@ impl Repl {
         self.machine.survey(&request).failures.last().map_or(0, |row| row.number)
     }
 
-    /// Runs the machine until `task` has ended, or can never do so.
+    /// Runs the machine until `task` has ended, can never do so, or is held.
     fn run(&mut self, task: TaskId) -> RunOutcome {
         loop {
-            // A requested line does not end an evaluation; it may have come just now.
             match self.machine.run_until(Some(task), u64::MAX) {
-                RunOutcome::Stopped => {}
+                // A requested line does not end an evaluation; it may have come just now.
+                RunOutcome::Stopped if !self.hold(task) => {}
                 outcome => return outcome,
             }
         }
@@ -373,6 +397,12 @@ impl Repl {
                 return None;
             }
         };
+        self.attend(task)
+    }
+
+    /// Runs a task that Ctrl-C aborts until it has ended or is held, and says what became of it. Returns its
+    /// first value.
+    fn attend(&mut self, task: TaskId) -> Option<Value> {
         self.machine.set_interruptible(Some(task));
         if self.run(task) == RunOutcome::Waiting {
             let report = self.machine.deadlock_report();
@@ -383,6 +413,11 @@ impl Repl {
         self.machine.set_interruptible(None);
         self.interrupts.forget();
         let result = self.machine.result(task);
+        if matches!(result, TaskResult::Running) {
+            // It waits for the choice of a restart.
+            _ = std::io::stdout().flush();
+            return None;
+        }
         let report = self.machine.detailed_report(task);
         let full = self.machine.full_report(task);
         self.machine.forget(task);
@@ -392,8 +427,7 @@ impl Repl {
             TaskResult::Failed(_) => match report {
                 Some(report) => {
                     print!("{}", in_short(&report));
-                    self.failure = Some((report, self.noted_failures()));
-                    self.full = full;
+                    self.failure = Some(FormFailure { report, full, noted: self.noted_failures() });
                 }
                 None => println!("Aborted"),
             },
