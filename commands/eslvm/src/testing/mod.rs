@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use esl::Error;
 use esl::module_path::ModulePath;
 use esl::program::{self, Modules, Program};
 use esl_command as command;
@@ -169,7 +170,13 @@ fn run_files(found: &TestFiles, library: &[PathBuf], options: &Options) -> Resul
     let mut total = 0;
     for suite in &suites {
         let tests = list(&suite.program, &suite.setup).map_err(|error| {
-            complain(format_args!("{} has no tests to run: {error}", suite.file.display()));
+            let reason = match error {
+                Error::BudgetSpent => {
+                    "its top-level forms have spent the budget of ticks; raise it by --budget".into()
+                }
+                error => error.to_string(),
+            };
+            complain(format_args!("{} has no tests to run: {reason}", suite.file.display()));
             FAILED
         })?;
         refuse_two_of_one_name(suite.file, &tests)?;

@@ -49,6 +49,16 @@ fn calls_of_the_library_are_shown_on_request() {
     assert!(frames[0].starts_with("in (LAMBDA), sort.esl:1:"), "{frames:#?}");
 }
 
+/// A file whose own forms use up the budget is told of in the words of the command.
+#[test]
+fn the_budget_is_also_that_of_the_file() {
+    let folder = Folder::with("testing-budget", &[("t.esl", "(loop)\n(deftest one (is t))")]);
+    let run = process::run(eslvm(&["test", "--budget", "10000", "t.esl"]).current_dir(folder.path()), "");
+    let expected = "eslvm: t.esl has no tests to run: its top-level forms have spent the budget of ticks; raise it by \
+                    --budget\n";
+    assert_eq!((run.status, run.errors.as_str()), (Some(1), expected));
+}
+
 #[test]
 fn failures_are_shown_with_what_repeats_them() {
     let folder = folder("testing-all");
