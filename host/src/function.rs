@@ -21,7 +21,7 @@ use std::pin::Pin;
 use esl_bytecode::datum::Datum;
 
 use super::argument::{ArgumentList, ArgumentReader};
-use super::value::{IntoDatum, IntoValues};
+use super::value::{HostHandle, HostObject, IntoDatum, IntoValues};
 use super::{HostFailure, HostOperation, Inbox, Right};
 
 /// Code of the host that takes and returns data, and cannot call back.
@@ -130,6 +130,20 @@ impl HostRows {
             result.unwrap_or_else(|panic| Err(HostFailure::of_panic(&*panic))).map(R::into_datum)
         };
         self.add(name, parameters.to_vec(), documentation, HostFunction::AtOnce(Box::new(function)))
+    }
+
+    /// Adds a function without parameters that returns a new object of this type. A program has the object
+    /// before the operation that opens it, so that a call that is left early leaves nothing open.
+    pub fn constructor<T: HostObject + Default>(
+        &mut self,
+        name: &'static str,
+        documentation: &'static str,
+    ) -> &mut HostRow {
+        let mut made = 0;
+        self.at_once(name, [], documentation, move || {
+            made += 1;
+            Ok(HostHandle::new(made, T::default()))
+        })
     }
 
     /// Adds a function whose calls are operations: `begin` begins the future that its Rust code returns.

@@ -32,6 +32,7 @@ mod os;
 mod process;
 #[cfg(feature = "serial")]
 mod serial;
+mod slot;
 mod socket;
 #[cfg(feature = "tls")]
 mod tls;

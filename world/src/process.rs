@@ -116,11 +116,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         },
     )
     .needs(Right::Run, "program");
-    let mut made = 0;
-    rows.at_once("%PROCESS-NEW", [], "Returns a process that is not launched.", move || {
-        made += 1;
-        Ok(HostHandle::new(made, ChildProcess::default()))
-    });
+    rows.constructor::<ChildProcess>("%PROCESS-NEW", "Returns a process that is not launched.");
     rows.operation(
         spawned,
         "%PROCESS-LAUNCH",

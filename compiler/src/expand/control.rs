@@ -80,26 +80,28 @@ pub(super) fn the(expander: &mut Expander, _: &mut dyn Environment, form: Form, 
 
 /// `(and form*)`
 pub(super) fn and(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
-    match form.args.len() {
-        0 => expander.fill(to, NodeKind::Constant(Datum::symbol(Symbol::cl("T"), to.span))),
-        1 => expander.schedule([Job::Expand(form.args[0].clone(), to)]),
-        _ => {
-            let (nodes, jobs) = expander.children(form.args, to);
-            expander.fill(to, NodeKind::And(nodes));
-            expander.schedule(jobs);
-        }
-    }
-    Ok(())
+    connective(expander, form, to, Datum::symbol(Symbol::cl("T"), to.span), NodeKind::And)
 }
 
 /// `(or form*)`
 pub(super) fn or(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    connective(expander, form, to, Datum::nil(to.span), NodeKind::Or)
+}
+
+/// Builds a node of several forms; one form stands for itself, and `none` for no form.
+fn connective(
+    expander: &mut Expander,
+    form: Form,
+    to: To,
+    none: Datum,
+    node: fn(Vec<NodeId>) -> NodeKind,
+) -> Checked {
     match form.args.len() {
-        0 => expander.fill(to, NodeKind::Constant(Datum::nil(to.span))),
+        0 => expander.fill(to, NodeKind::Constant(none)),
         1 => expander.schedule([Job::Expand(form.args[0].clone(), to)]),
         _ => {
             let (nodes, jobs) = expander.children(form.args, to);
-            expander.fill(to, NodeKind::Or(nodes));
+            expander.fill(to, node(nodes));
             expander.schedule(jobs);
         }
     }

@@ -67,22 +67,21 @@ impl FunctionBuilder<'_, '_> {
 
     /// Lowers a body with handlers.
     pub(super) fn handlers(&mut self, handlers: NodeId, body: NodeId, dest: Dest) {
-        let top = self.registers.top();
-        let depth = self.extents.len();
-        let handlers = self.operand(handlers, &[]);
-        self.registers.release(top);
-        self.emit(Instr::PushHandlers { window: top.into(), handlers });
-        self.open(Extent::Control);
-        self.form_inside(body, dest, depth);
+        self.under_entry(handlers, body, dest, |window, handlers| Instr::PushHandlers { window, handlers });
     }
 
     /// Lowers a body within which control entries are masked.
     pub(super) fn mask(&mut self, from: NodeId, body: NodeId, dest: Dest) {
+        self.under_entry(from, body, dest, |window, from| Instr::PushMask { window, from });
+    }
+
+    /// Lowers a body under a control entry, which an instruction pushes with the value of an operand.
+    fn under_entry(&mut self, operand: NodeId, body: NodeId, dest: Dest, push: fn(Window, Reg) -> Instr) {
         let top = self.registers.top();
         let depth = self.extents.len();
-        let from = self.operand(from, &[]);
+        let operand = self.operand(operand, &[]);
         self.registers.release(top);
-        self.emit(Instr::PushMask { window: top.into(), from });
+        self.emit(push(top.into(), operand));
         self.open(Extent::Control);
         self.form_inside(body, dest, depth);
     }

@@ -1,9 +1,9 @@
 //! The logical database: changes of facts, and queries in steps. Whatever calls functions of the program is
 //! ESL, in `stdlib/database.esl`.
 
-use esl_database::{Effort, FormulaError, Progress, QueryError};
+use esl_database::{Database, Effort, FormulaError, Progress, QueryError};
 
-use crate::heap::AllocError;
+use crate::heap::{AllocError, Heap};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::report;
 use crate::table::Table;
@@ -44,16 +44,29 @@ fn has_locks(vm: &Vm, locks: Value) -> bool {
     Table::of(&vm.heap, locks).is_some_and(|table| table.count(&vm.heap) > 0)
 }
 
-pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+/// Changes the facts by the first argument. Returns `None` and does nothing if the second one has locks.
+#[inline]
+fn change_unlocked<T>(
+    vm: &mut Vm,
+    arguments: &[Value],
+    change: impl FnOnce(&mut Database, &mut Heap, Value, &mut usize) -> Result<T, FormulaError>,
+) -> Result<Option<(Value, Result<T, FormulaError>)>, Exit> {
     let [fact, locks] = exactly(arguments);
     vm.scheduler.point()?;
     if has_locks(vm, locks) {
-        return Ok(vm.names.known.locked);
+        return Ok(None);
     }
     prepare(vm)?;
     let mut work = 0;
-    let outcome = vm.database.assert(&mut vm.heap, fact, &mut work);
+    let outcome = change(&mut vm.database, &mut vm.heap, fact, &mut work);
     vm.exchange.charge(4 * work);
+    Ok(Some((fact, outcome)))
+}
+
+pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some((fact, outcome)) = change_unlocked(vm, arguments, Database::assert)? else {
+        return Ok(vm.names.known.locked);
+    };
     let changed = checked(vm, outcome)?;
     if vm.watch.is_followed && changed.is_true() {
         report::tell_of_change(vm, fact, true);
@@ -101,15 +114,9 @@ pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [fact, locks] = exactly(arguments);
-    vm.scheduler.point()?;
-    if has_locks(vm, locks) {
+    let Some((fact, outcome)) = change_unlocked(vm, arguments, Database::retract)? else {
         return Ok(vm.names.known.locked);
-    }
-    prepare(vm)?;
-    let mut work = 0;
-    let outcome = vm.database.retract(&mut vm.heap, fact, &mut work);
-    vm.exchange.charge(4 * work);
+    };
     match outcome {
         Err(FormulaError::Variable(_)) => Ok(Value::small(0)),
         outcome => {

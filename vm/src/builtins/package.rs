@@ -194,49 +194,34 @@ pub(super) fn use_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn export(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.names.check_room(&mut vm.heap)?;
-    let symbols = named_symbols(vm, arguments[0])?;
-    let package = package_or_current(vm, optional(arguments, 1))?;
-    vm.exchange.charge(symbols.len() * 16);
-    for symbol in symbols {
-        let changed = vm.names.packages_mut().export(package, &symbol);
-        checked(&mut vm.exchange, changed)?;
-    }
-    Ok(Value::T)
+    change_by_each(vm, arguments, named_symbols, Packages::export)
 }
 
 pub(super) fn import(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    import_each(vm, arguments, Packages::import)
+    change_by_each(vm, arguments, named_symbols, Packages::import)
 }
 
 pub(super) fn shadowing_import(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    import_each(vm, arguments, Packages::shadowing_import)
-}
-
-/// Imports symbols into a package, each by `import`.
-fn import_each(
-    vm: &mut Vm,
-    arguments: &[Value],
-    import: fn(&mut Packages, PackageId, &Symbol) -> Result<(), PackageError>,
-) -> Outcome {
-    vm.names.check_room(&mut vm.heap)?;
-    let symbols = named_symbols(vm, arguments[0])?;
-    let package = package_or_current(vm, optional(arguments, 1))?;
-    vm.exchange.charge(symbols.len() * 16);
-    for symbol in symbols {
-        let changed = import(vm.names.packages_mut(), package, &symbol);
-        checked(&mut vm.exchange, changed)?;
-    }
-    Ok(Value::T)
+    change_by_each(vm, arguments, named_symbols, Packages::shadowing_import)
 }
 
 pub(super) fn shadow(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    change_by_each(vm, arguments, designated_names, |packages, package, name| packages.shadow(package, name))
+}
+
+/// Changes a package, the second argument, by each of the symbols or names that the first one designates.
+fn change_by_each<T>(
+    vm: &mut Vm,
+    arguments: &[Value],
+    designated: fn(&mut Vm, Value) -> Result<Vec<T>, Exit>,
+    change: fn(&mut Packages, PackageId, &T) -> Result<(), PackageError>,
+) -> Outcome {
     vm.names.check_room(&mut vm.heap)?;
-    let names = designated_names(vm, arguments[0])?;
+    let items = designated(vm, arguments[0])?;
     let package = package_or_current(vm, optional(arguments, 1))?;
-    vm.exchange.charge(names.len() * 16);
-    for name in names {
-        let changed = vm.names.packages_mut().shadow(package, &name);
+    vm.exchange.charge(items.len() * 16);
+    for item in items {
+        let changed = change(vm.names.packages_mut(), package, &item);
         checked(&mut vm.exchange, changed)?;
     }
     Ok(Value::T)

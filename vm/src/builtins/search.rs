@@ -9,7 +9,7 @@ use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
-use super::expect::exactly;
+use super::expect::{exactly, short_part};
 use super::{COPY_LIMIT, LIMIT};
 
 /// Returns the index of an element that is the same as `item`, between two bounds, the first or the last of
@@ -115,11 +115,7 @@ pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [item, sequence, start, end] = exactly(arguments);
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
         let length = elements.len();
-        let (start, end) = vm.exchange.bounds(start, end, length)?;
-        if end - start > COPY_LIMIT {
-            return Err(Exit::Slowly);
-        }
-        vm.exchange.charge_elements(end - start);
+        let (start, end) = short_part(vm, start, end, length)?;
         let heap = &vm.heap;
         let is_it = |index: &usize| {
             vector_elements(heap, sequence)

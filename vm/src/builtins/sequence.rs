@@ -11,7 +11,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::array::{ArrayElements, all_elements, set_element, storage, vector_elements, vector_length};
-use super::expect::{exactly, optional};
+use super::expect::{exactly, optional, short_part};
 use super::list::reverse_in_place;
 use super::{COPY_LIMIT, LIMIT};
 
@@ -168,11 +168,7 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (sequence, start, end) = (arguments[0], arguments[1], optional(arguments, 2));
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
         let length = elements.len();
-        let (start, end) = vm.exchange.bounds(start, end, length)?;
-        if end - start > COPY_LIMIT {
-            return Err(Exit::Slowly);
-        }
-        vm.exchange.charge_elements(end - start);
+        let (start, end) = short_part(vm, start, end, length)?;
         if vm.heap.string(sequence).is_some() {
             return Ok(vm.heap.alloc_string_of(end - start, 1, |heap, _| {
                 heap.string(sequence).and_then(|all| all.get(start..end)).unwrap_or_default()

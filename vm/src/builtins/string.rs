@@ -15,7 +15,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::COPY_LIMIT;
-use super::expect::{exactly, optional};
+use super::expect::{exactly, optional, short_part};
 
 /// Length of a pattern times that of the string in which it may be looked for at once.
 const SEARCH_LIMIT: usize = 1 << 20;
@@ -38,11 +38,8 @@ pub(crate) fn string_designator(vm: &mut Vm, v: Value) -> Outcome {
 /// Returns a designator's string, and the bounds of a part of it.
 fn designated_part(vm: &mut Vm, v: Value, start: Value, end: Value) -> Result<(Value, usize, usize), Exit> {
     let string = string_designator(vm, v)?;
-    let (start, end) = vm.exchange.bounds(start, end, text(vm, string).len())?;
-    if end - start > COPY_LIMIT {
-        return Err(Exit::Slowly);
-    }
-    vm.exchange.charge_elements(end - start);
+    let length = text(vm, string).len();
+    let (start, end) = short_part(vm, start, end, length)?;
     Ok((string, start, end))
 }
 

@@ -11,7 +11,7 @@
 use std::fs::{File, OpenOptions};
 use std::io::Error;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use esl_host::{
     FileAnswer, FileRequest, HostError, HostFailure, HostHandle, HostObject, HostRows, Inbox, IntoDatum,
@@ -19,6 +19,7 @@ use esl_host::{
 };
 
 use crate::operation::{Cancelled, spawned, to_its_end};
+use crate::slot::OpenSlot;
 
 mod open;
 
@@ -26,11 +27,6 @@ use open::{FileAccess, Open, WrittenAt};
 
 /// Most bytes that are read at a time.
 const CHUNK: usize = 1 << 15;
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // The guarded data are consistent at every moment, so a panic elsewhere does not corrupt them.
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// Returns what a function comes to that the system may delay.
 async fn in_thread<T: Send + 'static>(
@@ -41,16 +37,7 @@ async fn in_thread<T: Send + 'static>(
 
 /// A file of the program's.
 #[derive(Default)]
-struct FileSlot(Mutex<FileStage>);
-
-#[derive(Default)]
-enum FileStage {
-    /// It has yet to be opened.
-    #[default]
-    New,
-    Open(Arc<Open>),
-    Closed,
-}
+struct FileSlot(OpenSlot<Open>);
 
 impl HostObject for FileSlot {
     const KIND: &'static str = "FILE";
@@ -58,23 +45,11 @@ impl HostObject for FileSlot {
 
 impl FileSlot {
     fn get(&self) -> Result<Arc<Open>, HostFailure> {
-        match &*lock(&self.0) {
-            FileStage::Open(open) => Ok(open.clone()),
-            _ => Err(HostFailure::new("SIMPLE-ERROR", "The file is closed.")),
-        }
-    }
-
-    /// Says what a file is, unless it has been closed meanwhile.
-    fn set(&self, open: Open) {
-        let mut stage = lock(&self.0);
-        if matches!(*stage, FileStage::New) {
-            *stage = FileStage::Open(Arc::new(open));
-        }
+        self.0.get().ok_or_else(|| HostFailure::new("SIMPLE-ERROR", "The file is closed."))
     }
 
     fn close(&self) {
-        let stage = std::mem::replace(&mut *lock(&self.0), FileStage::Closed);
-        if let FileStage::Open(open) = stage {
+        if let Some(open) = self.0.close() {
             // No operation may wait for it.
             _ = open.closing.send(true);
         }
@@ -264,11 +239,7 @@ async fn requested(request: impl FnOnce() -> Result<FileAnswer, HostError> + Sen
 
 /// Adds the functions that do not wait.
 fn add_immediate(rows: &mut HostRows) {
-    let mut made = 0;
-    rows.at_once("%FILE-NEW", [], "Returns a file that is not open.", move || {
-        made += 1;
-        Ok(HostHandle::new(made, FileSlot::default()))
-    });
+    rows.constructor::<FileSlot>("%FILE-NEW", "Returns a file that is not open.");
     rows.at_once(
         "%FILE-TAKE",
         ["file", "as-text"],
@@ -333,7 +304,7 @@ async fn open_input(file: HostHandle<FileSlot>, path: String, as_text: bool) -> 
     #[cfg(not(unix))]
     let polled = None;
     let access = polled.unwrap_or_else(|| FileAccess::Threads(Mutex::new(Some(file))));
-    slot.set(Open::new(access, text));
+    _ = slot.0.open(Open::new(access, text));
     if is_regular {
         // An unreadable file fails here, and a short one is read at once.
         return answer(slot.get()?.fill().await.map(|()| true));
@@ -367,7 +338,7 @@ async fn open_output(file: HostHandle<FileSlot>, path: String, mode: i64) -> Fil
         return answer::<()>(Err(error));
     }
     let next = if mode == 3 { WrittenAt::Position(0) } else { WrittenAt::End };
-    file.set(Open::new(FileAccess::Parts(path, Mutex::new(next)), None));
+    _ = file.0.open(Open::new(FileAccess::Parts(path, Mutex::new(next)), None));
     answer(Ok(()))
 }
 
@@ -390,7 +361,7 @@ async fn open_device(slot: &FileSlot, path: PathBuf) -> Result<(), Error> {
             Ok(file) => {
                 let polled = polled(&file, tokio::io::Interest::WRITABLE);
                 let access = polled.unwrap_or_else(|| FileAccess::Threads(Mutex::new(Some(file))));
-                slot.set(Open::new(access, None));
+                _ = slot.0.open(Open::new(access, None));
                 return Ok(());
             }
             // The system does not report the arrival of a reader, so it is asked again.

@@ -9,8 +9,9 @@ use esl_bytecode::Bytes;
 use esl_bytecode::datum::Datum;
 use tokio::sync::watch;
 
-use super::{CHUNK, at_once, in_thread, lock};
+use super::{CHUNK, at_once, in_thread};
 use crate::arrived::Arrived;
+use crate::socket::lock;
 
 /// How a file is reached.
 pub(super) enum FileAccess {

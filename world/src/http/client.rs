@@ -7,7 +7,7 @@
 use std::future::Future;
 use std::io::{Error, ErrorKind};
 use std::pin::Pin;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -29,7 +29,8 @@ use super::coding::{ACCEPTED, Coding, PIECE};
 use super::{HEAD, HEADERS, headers_as_pairs, headers_of, http_failure, target};
 use crate::arrived::Arrived;
 use crate::operation::{ready_soon, spawned};
-use crate::socket::{lock, socket_failure};
+use crate::slot::OpenSlot;
+use crate::socket::socket_failure;
 
 /// Most bytes that are handed to the program at a time.
 const MOST_AT_ONCE: usize = 1 << 16;
@@ -79,16 +80,7 @@ struct AnswerBody {
 
 /// A request of the program's.
 #[derive(Default)]
-struct RequestSlot(Mutex<RequestStage>);
-
-#[derive(Default)]
-enum RequestStage {
-    /// It has yet to be begun.
-    #[default]
-    New,
-    Begun(Arc<HttpExchange>),
-    Over,
-}
+struct RequestSlot(OpenSlot<HttpExchange>);
 
 impl HostObject for RequestSlot {
     const KIND: &'static str = "HTTP-REQUEST";
@@ -96,21 +88,12 @@ impl HostObject for RequestSlot {
 
 impl RequestSlot {
     fn get(&self) -> Result<Arc<HttpExchange>, HostFailure> {
-        match &*lock(&self.0) {
-            RequestStage::Begun(exchange) => Ok(exchange.clone()),
-            _ => Err(http_failure("the request is over")),
-        }
+        self.0.get().ok_or_else(is_over)
     }
+}
 
-    /// Says what a request is, which may have been left meanwhile.
-    fn set(&self, exchange: HttpExchange) -> Result<(), HostFailure> {
-        let mut stage = lock(&self.0);
-        if matches!(*stage, RequestStage::Over) {
-            return Err(http_failure("the request is over"));
-        }
-        *stage = RequestStage::Begun(Arc::new(exchange));
-        Ok(())
-    }
+fn is_over() -> HostFailure {
+    http_failure("the request is over")
 }
 
 /// Body of a request, as the program gives it: a text or bytes, `NIL` for none, or `T` if it comes in parts.
@@ -133,14 +116,9 @@ impl FromArgument for GivenBody {
 
 /// Adds the functions of clients.
 pub(super) fn add(rows: &mut HostRows) {
-    let mut made = 0;
-    rows.at_once("%HTTP-NEW-REQUEST", [], "Returns a request that is not begun.", move || {
-        made += 1;
-        Ok(HostHandle::new(made, RequestSlot::default()))
-    });
+    rows.constructor::<RequestSlot>("%HTTP-NEW-REQUEST", "Returns a request that is not begun.");
     rows.at_once("%HTTP-CLOSE-REQUEST", ["request"], "Ends REQUEST.", |request: HostHandle<RequestSlot>| {
-        let stage = std::mem::replace(&mut *lock(&request.0), RequestStage::Over);
-        drop(stage);
+        drop(request.0.close());
         Ok(())
     });
     rows.operation(
@@ -162,7 +140,8 @@ pub(super) fn add(rows: &mut HostRows) {
             let request = request(&method, &url, given, body)?;
             let (answer, driver) = send(&address, &url, ca_file, request).await?;
             let (parts, answer) = (tokio::sync::Mutex::new(parts), tokio::sync::Mutex::new(answer));
-            slot.set(HttpExchange { _driver: driver, parts, answer, takes_any_coding })
+            let exchange = HttpExchange { _driver: driver, parts, answer, takes_any_coding };
+            if slot.0.open(exchange) { Ok(()) } else { Err(is_over()) }
         },
     )
     .needs(Right::Net, "address")

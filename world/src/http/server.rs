@@ -92,11 +92,7 @@ impl ServerSlot {
 
 /// Adds the functions of servers.
 pub(super) fn add(rows: &mut HostRows) {
-    let mut made = 0;
-    rows.at_once("%HTTP-NEW-SERVER", [], "Returns a server that does not listen.", move || {
-        made += 1;
-        Ok(HostHandle::new(made, ServerSlot::default()))
-    });
+    rows.constructor::<ServerSlot>("%HTTP-NEW-SERVER", "Returns a server that does not listen.");
     rows.operation(
         spawned,
         "%HTTP-LISTEN",

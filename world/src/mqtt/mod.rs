@@ -170,11 +170,7 @@ impl FromArgument for Will {
 /// Returns the functions of `:mqtt`.
 pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     let mut rows = HostRows::new(inbox);
-    let mut made = 0;
-    rows.at_once("%MQTT-NEW", [], "Returns a client that is not connected.", move || {
-        made += 1;
-        Ok(HostHandle::new(made, Client::default()))
-    });
+    rows.constructor::<Client>("%MQTT-NEW", "Returns a client that is not connected.");
     rows.operation(
         spawned,
         "%MQTT-OPEN",

@@ -118,11 +118,7 @@ impl Following {
 /// Returns the functions of `watch-path`, which the library calls by their names.
 pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     let mut rows = HostRows::new(inbox);
-    let mut made = 0;
-    rows.at_once("%WATCH-NEW", [], "Returns a watch of no path.", move || {
-        made += 1;
-        Ok(HostHandle::new(made, WatchSlot::default()))
-    });
+    rows.constructor::<WatchSlot>("%WATCH-NEW", "Returns a watch of no path.");
     rows.at_once("%WATCH-CLOSE", ["watch"], "Ends WATCH.", |watch: HostHandle<WatchSlot>| {
         watch.set(None);
         Ok(())

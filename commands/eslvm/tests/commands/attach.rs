@@ -34,9 +34,7 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
     let wrong = folder.file("wrong.esl", "(defun drive (n) 1) (defparameter *speed* (error \"no speed\"))");
     let (incomplete, other) =
         (folder.file("incomplete.esl", "(defun f ("), folder.file("other.esl", "(print 1)"));
-    let socket = folder.join("s");
-    let mut run = Operated::start(&folder, PROGRAM, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, PROGRAM, &[]);
     let (output, status) = session(
         &socket,
         &format!(
@@ -84,10 +82,8 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
 #[test]
 fn commands_say_what_they_do() {
     let folder = Folder::new("attach_commands");
-    let socket = folder.join("s");
     let program = "(spawn (:name 'driver :daemon t) (loop (sleep 1000))) (read-line *standard-input* nil)";
-    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, program, &[]);
     let (number, _) =
         session(&socket, "(princ (esl::%task-number (find 'driver (list-tasks) :key #'task-name)))\n");
     let number = number.lines().next().unwrap_or_default().to_string();
@@ -116,12 +112,10 @@ fn commands_say_what_they_do() {
 #[test]
 fn who_leaves_takes_what_it_evaluates_with_it() {
     let folder = Folder::new("attach_leaves");
-    let socket = folder.join("s");
     let program = "(defvar *ended* (make-event)) (defvar *begun* nil)
         (spawn (:daemon t) (loop (sleep 1000)))
         (wait-for-event *ended*) (princ 'ended)";
-    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, program, &[]);
     // Its task is aborted while it waits, and its cleanup ends the run.
     let mut stream = std::os::unix::net::UnixStream::connect(&socket).expect("the run listens");
     let form =

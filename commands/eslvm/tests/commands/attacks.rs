@@ -98,12 +98,10 @@ fn written_until_answer(stream: UnixStream) -> String {
 #[test]
 fn an_evaluation_waits_for_who_does_not_read_it() {
     let folder = Folder::new("attacks_reader");
-    let socket = folder.join("s");
     let program = "(defvar *at* 0) (defvar *beats* 0)
         (spawn (:daemon t) (loop (sleep 0.01) (incf *beats*)))
         (read-line *standard-input* nil)";
-    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, program, &[]);
     let mut stream = UnixStream::connect(&socket).expect("the run listens");
     stream.set_read_timeout(Some(PATIENCE)).expect("it can be set");
     let form = "(dotimes (i 200000) (setq *at* i) (write-line (princ-to-string i)))";
@@ -140,10 +138,8 @@ fn an_evaluation_waits_for_who_does_not_read_it() {
 #[test]
 fn an_evaluation_has_a_part_of_the_memory() {
     let folder = Folder::new("attacks_memory");
-    let socket = folder.join("s");
     let program = "(defvar *kept* nil) (read-line *standard-input* nil) (princ (length (make-list 100000)))";
-    let mut run = Operated::start(&folder, program, &["--listen", &socket, "--memory", "64M"]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, program, &["--memory", "64M"]);
     let (said, _) = session(
         &socket,
         "(loop (push (make-string 1000) *kept*))\n(dotimes (i 2000) (spawn (sleep 100)))\n(+ 1 2)\n",
@@ -156,10 +152,8 @@ fn an_evaluation_has_a_part_of_the_memory() {
 #[test]
 fn an_operator_hears_how_the_run_ends() {
     let folder = Folder::new("attacks_end");
-    let socket = folder.join("s");
     let program = "(define-input news) (wait-for-event news) (fail :wheel-stuck 3)";
-    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (mut run, socket) = Operated::listening(&folder, program, &[]);
     // It waits for the operator, and says so.
     run.said("; all tasks wait, and only an operator can signal NEWS");
     let (said, status) = session(&socket, ":signal news\n(sleep 100)\n");

@@ -70,15 +70,21 @@ fn the_readme_shows_a_run_of_an_example() {
     );
 }
 
+/// Compiles the spacecraft of the examples against its script. Returns the path of the program.
+fn scripted_spacecraft(folder: &Folder) -> String {
+    let source = esl_conformance::root().join("examples/spacecraft/scripted.esl");
+    let program = folder.join("scripted.eslb");
+    let compiled = process::run(eslc(&["compile", "-o", &program]).arg(source), "");
+    assert_eq!(compiled.status, Some(0), "{}", compiled.errors);
+    program
+}
+
 /// Under fifty seeds of faults the executive breaks no rule (its wheels are commanded by one activity at a
 /// time, its battery is never empty) and the spacecraft points at the sun in the end.
 #[test]
 fn the_spacecraft_survives_its_faults() {
-    let source = esl_conformance::root().join("examples/spacecraft/scripted.esl");
     let folder = Folder::new("spacecraft");
-    let program = folder.join("scripted.eslb");
-    let compiled = process::run(eslc(&["compile", "-o", &program]).arg(source), "");
-    assert_eq!(compiled.status, Some(0), "{}", compiled.errors);
+    let program = scripted_spacecraft(&folder);
     let (mut safe_modes, mut violations) = (0, 0);
     for seed in 1..=50 {
         let seed = seed.to_string();
@@ -95,11 +101,8 @@ fn the_spacecraft_survives_its_faults() {
 /// Wherever a flight is cut off, the spacecraft points at the sun in the end.
 #[test]
 fn the_spacecraft_is_left_in_order_wherever_its_budget_ends() {
-    let source = esl_conformance::root().join("examples/spacecraft/scripted.esl");
     let folder = Folder::new("spacecraft-budget");
-    let program = folder.join("scripted.eslb");
-    let compiled = process::run(eslc(&["compile", "-o", &program]).arg(source), "");
-    assert_eq!(compiled.status, Some(0), "{}", compiled.errors);
+    let program = scripted_spacecraft(&folder);
     for budget in (1000..11_000).step_by(487) {
         let (seed, budget) = ((budget % 7).to_string(), budget.to_string());
         let options = ["run", "--clock", "virtual", "--seed", &seed, "--budget", &budget, &program];

@@ -23,6 +23,14 @@ impl Operated {
         Operated::start_in(Path::new("."), folder, text, options)
     }
 
+    /// Starts a program with these options, to which operators attach at the returned path.
+    pub(crate) fn listening(folder: &Folder, text: &str, options: &[&str]) -> (Operated, String) {
+        let socket = folder.join("s");
+        let mut run = Operated::start(folder, text, &[&["--listen", &socket], options].concat());
+        run.said("; operators attach with eslvm attach ");
+        (run, socket)
+    }
+
     /// Starts a program in a folder other than that of the tests.
     pub(crate) fn start_in(place: &Path, folder: &Folder, text: &str, options: &[&str]) -> Operated {
         let program = folder.file("program.esl", text);

@@ -48,9 +48,7 @@ fn a_patch_of_kinds_and_shared_things_is_made_and_undone_in_one_step() {
     let constant = folder.file("constant.esl", "(defun state () nil) (defconstant +limit+ 6)");
     let unfit = folder.file("unfit.esl", "(defun state () nil) (define-rule (place ?x ?y) (near ?x))");
     let class = folder.file("class.esl", "(defclass rover () ((speed) (fuel))) (defparameter *no* (car 1))");
-    let socket = folder.join("s");
-    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, program, &[]);
     let (output, status) = session(
         &socket,
         &format!(
@@ -115,9 +113,7 @@ fn rules_are_patched_and_new_kinds_are_gone_after_an_undo() {
         "(defstruct hub n m) (defconstant +limit+ 6) (defclass probe () (width))
          (define-rule (near ice))",
     );
-    let socket = folder.join("s");
-    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, program, &[]);
     let (output, status) = session(
         &socket,
         &format!(
@@ -200,9 +196,7 @@ fn a_patch_of_other_definitions_is_undone_as_a_whole() {
         "wrong.esl",
         "(defmacro twice (form) `(quote ,form)) (defmethod weight ((thing symbol)) 0) (defparameter *done* (car 1))",
     );
-    let socket = folder.join("s");
-    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, program, &[]);
     let look = "(list (both 1) (twice 2) (weight 4) (typep 50 'small) (fboundp 'size) (fboundp 'thrice))\n";
     let (output, status) = session(
         &socket,

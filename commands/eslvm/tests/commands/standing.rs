@@ -66,9 +66,7 @@ impl Operator {
 #[test]
 fn a_watched_form_is_told_of_after_each_change() {
     let folder = Folder::new("standing_watch");
-    let socket = folder.join("s");
-    let mut run = Operated::start(&folder, PROGRAM, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, PROGRAM, &[]);
     let mut operator = Operator::attach(&socket);
     operator.types(":watch (list (mode) (< level 5))");
     assert_eq!(operator.hears(), "; (LIST (MODE) (< LEVEL 5)) is (CALM NIL)");
@@ -88,9 +86,7 @@ fn a_watched_form_is_told_of_after_each_change() {
 #[test]
 fn tasks_stand_still_go_on_and_end() {
     let folder = Folder::new("standing_tasks");
-    let socket = folder.join("s");
-    let mut run = Operated::start(&folder, PROGRAM, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, PROGRAM, &[]);
     let mut operator = Operator::attach(&socket);
     operator.types("(esl::%task-number (find 'counter (list-tasks) :key #'task-name))");
     let number = operator.hears();
@@ -125,11 +121,9 @@ fn tasks_stand_still_go_on_and_end() {
 #[test]
 fn many_facts_are_shown_by_pages() {
     let folder = Folder::new("standing_facts");
-    let socket = folder.join("s");
     let program =
         "(dotimes (i 1203) (assert (list 'seen i))) (assert '(mode calm)) (read-line *standard-input* nil)";
-    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
-    run.said("; operators attach with eslvm attach ");
+    let (run, socket) = Operated::listening(&folder, program, &[]);
     for (command, lines, last) in [
         (":facts seen", 501, "; 1 to 500 of 1203; `:facts NAME 500` shows those after these"),
         (":facts seen 1000", 203, "(SEEN 1202)"),
