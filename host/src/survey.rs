@@ -334,7 +334,7 @@ mod tests {
     use crate::{Incoming, Wake};
 
     #[test]
-    fn a_look_is_told_from_an_arrival() {
+    fn an_inspection_is_told_from_an_arrival() {
         let inbox = Inbox::new();
         inbox.inspect(Inspection::Watch);
         assert!(inbox.is_rung() && inbox.why_rung() == Wake::Inspection);

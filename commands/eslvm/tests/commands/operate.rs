@@ -169,3 +169,16 @@ fn an_address_that_cannot_be_had_is_refused() {
     run.said(&format!("eslvm: cannot listen at {address}: "));
     assert_eq!(run.end(), Some(2));
 }
+
+/// The part of the library for operators is loaded only into a machine whose run is served to them.
+#[test]
+fn only_a_run_that_is_served_has_the_part_for_operators() {
+    let folder = Folder::new("operate_part");
+    let program = folder.file("program.esl", "(print (fboundp 'esl::%session-evaluate))");
+    for (options, expected) in
+        [(&[][..], "NIL"), (&["--metrics", "0"], "NIL"), (&["--monitor"], "T"), (&["--listen", "0"], "T")]
+    {
+        let run = esl_conformance::process::run(&mut eslvm(&[&["run"], options, &[&*program]].concat()), "");
+        assert_eq!((run.status, run.output.trim()), (Some(0), expected), "{options:?}: {}", run.errors);
+    }
+}
