@@ -119,11 +119,11 @@ pub(crate) fn install(machine: &mut Vm) {
     everywhere.for_each(|row| machine.add_host_row(row));
 }
 
-/// Adds the functions that reach the real world.
+/// Adds the functions that reach the real world. They replace those of [`install`] too: functions of a module
+/// may share what one of them sets.
 pub(crate) fn install_operations(machine: &mut Vm) {
     let inbox = machine.inbox();
-    let outside = all_rows(&inbox).filter(|row| !row.is_everywhere);
-    outside.for_each(|row| machine.add_host_row(row));
+    all_rows(&inbox).for_each(|row| machine.add_host_row(row));
 }
 
 /// Returns the functions of all modules and of the library.
