@@ -11,7 +11,7 @@ use std::sync::Arc;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::packed::PackedVector;
 use esl_bytecode::span::Span;
-use esl_robots::message::{Element, FieldExtent, MessageType, Scalar, Types, decode, encode};
+use esl_robots::message::{Element, FieldExtent, MessageType, Scalar, Types, decode, encode, noise};
 
 /// Random messages, both ways.
 const MESSAGES: usize = 10_000;
@@ -354,4 +354,26 @@ fn messages_and_hashes_equal_those_of_rosbags() {
         fs::write(&table, &hashes).expect("a file");
     }
     assert_eq!(hashes, fs::read_to_string(&table).expect("it is there"), "ESL_BLESS=1 writes the table");
+}
+
+/// The checks of the fuzz target, with mutated definitions and payloads.
+#[test]
+fn mutated_definitions_and_payloads_are_read_or_refused() {
+    let types = Types::bundled();
+    let names = types.names();
+    let mut random = Random(0x5851_f42d_4c95_7f2d);
+    for round in 0..20_000 {
+        let name = &names[random.below(names.len())];
+        let mut bytes = types.text(name).expect("it is bundled").into_bytes();
+        bytes.truncate(400);
+        bytes.extend([0, 0, 1, 0, 0]);
+        bytes.extend((0..random.below(80)).map(|_| [0, 0, 0, 1, 2, 0xff][random.below(6)]));
+        for _ in 0..random.below(8) {
+            let place = random.below(bytes.len());
+            bytes[place] = b"\0\n =#[]<\"'-9a/\xff"[random.below(15)];
+        }
+        // The payload of a bundled type begins behind the first byte.
+        let bytes = if round % 2 == 0 { bytes } else { bytes.split_off(bytes.len() / 2) };
+        noise::understand(&types, &bytes);
+    }
 }

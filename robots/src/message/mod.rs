@@ -15,6 +15,8 @@ mod definition;
 mod describe;
 mod fault;
 mod message_type;
+#[doc(hidden)]
+pub mod noise;
 mod reader;
 mod scalar;
 #[cfg(test)]
