@@ -44,7 +44,6 @@ static CHECKS: LazyLock<FxHashMap<Symbol, FormCheck>> = LazyLock::new(|| {
     let own: &[(&str, FormCheck)] = &[
         ("ASSERT", assert),
         ("DEFINE-EXCLUSIVE", operation::exclusive),
-        ("DEFINE-MOCK", operation::mock),
         ("FAIL", fail),
         ("START", operation::start),
         ("WITH-RECOVERY-PROCEDURES", recovery),
@@ -61,6 +60,7 @@ static CHECKS: LazyLock<FxHashMap<Symbol, FormCheck>> = LazyLock::new(|| {
         ("WITH-TIMEOUT", body),
         ("WITH-WORLD", operation::world),
         ("WITHOUT-INTERRUPTS", body),
+        ("%DEFINE-STARTER", operation::starter),
     ];
     let standard = standard.iter().map(|&(name, check)| (Symbol::cl(name), check));
     let own = own.iter().map(|&(name, check)| (Symbol::esl(name), check));
@@ -80,8 +80,11 @@ impl Expander {
         origin: Option<OriginId>,
     ) {
         let Some(check) = CHECKS.get(&form.operator) else { return };
-        // The expansion of a macro of the program may handle the failures of forms inside its call.
-        if is_known(self.origins.written(form.span, origin)) || !self.origins.is_of_library(form.span, origin)
+        // The expansion of a macro of the program may handle the failures of forms inside its call. A form
+        // whose name begins with `%` stands in expansions of the library's macros only.
+        if form.operator.name().starts_with('%')
+            || is_known(self.origins.written(form.span, origin))
+            || !self.origins.is_of_library(form.span, origin)
         {
             check(self, environment, form, origin);
         }

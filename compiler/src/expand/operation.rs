@@ -44,6 +44,11 @@ fn has(environment: &dyn Environment, symbol: &Symbol, indicator: &str) -> bool 
 }
 
 impl UnitOperations {
+    /// Whether the unit defines an operation of this name.
+    pub(super) fn define(&self, symbol: &Symbol) -> bool {
+        self.defined.contains(symbol)
+    }
+
     /// Whether the name is that of an operation.
     pub(super) fn include(&self, environment: &dyn Environment, symbol: &Symbol) -> bool {
         self.defined.contains(symbol) || has(environment, symbol, "%STARTER")
@@ -93,8 +98,9 @@ impl OperationUse {
     }
 }
 
-/// `(define-mock name …)`
-pub(super) fn mock(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
+/// `(%define-starter name …)`, of which the expansions of `define-mock` and of the functions of modules have
+/// one for each operation.
+pub(super) fn starter(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
     if let Some(symbol) = form.args.first().and_then(Datum::as_symbol) {
         expander.globals.operations.defined.insert(symbol.clone());
     }

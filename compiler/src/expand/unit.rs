@@ -62,6 +62,8 @@ impl GlobalUses {
                         continue;
                     }
                     GlobalFunction::Macro => continue,
+                    // A script of a world may answer the calls of a name that is nothing else.
+                    GlobalFunction::Undefined if self.operations.define(&call.function.symbol) => continue,
                     GlobalFunction::Undefined => {
                         if let Some(foreign) = foreign_call(&call) {
                             findings.diagnostics.push(foreign);
