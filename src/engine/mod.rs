@@ -232,7 +232,8 @@ impl Engine {
     /// `define-exclusive`.
     ///
     /// # Errors
-    /// [`Error::InvalidName`].
+    /// [`Error::InvalidName`]; [`Error::Failed`] if the name is not that of an operation, or the parameter is
+    /// unknown.
     pub fn make_exclusive(&mut self, name: &str, parameter: Option<&str>) -> Result<(), Error> {
         check_name(name)?;
         parameter.map_or(Ok(()), check_name)?;

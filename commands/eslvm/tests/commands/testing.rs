@@ -277,3 +277,27 @@ fn tests_are_run_again_when_a_source_changes() {
     child.kill().expect("it runs");
     child.wait().expect("it ends");
 }
+
+/// Under all schedules, exclusive calls that are refused are not calls to the world and take no clause, and the
+/// end of a call is noted.
+#[test]
+fn worlds_of_scripts_hold_under_all_schedules() {
+    let text = "(define-mock drive (n) (sleep 1) n)
+(define-exclusive drive)
+(defun try () (with-recovery-procedures ((:operation-busy (abort 'busy))) (drive 1)))
+(deftest exclusive :explore t
+  (with-world ((:answer (drive 1) :after 1 :with 'one :times 1))
+    (let ((values (multiple-value-list (task-net (a (try)) (b (try))))))
+      (is (or (equal values '(one busy)) (equal values '(busy one))))
+      (is (= (length (world-calls 'drive)) 1)))))
+(deftest cancelled :explore t
+  (with-world ((:answer (drive *) :after 2 :with 'there))
+    (let ((handle (start (drive 1))))
+      (spawn (:name 'canceller) (cancel handle))
+      (handler-case (operation-result handle) (failure () nil))
+      (is (find (fourth (first (world-calls 'drive))) '(:completed :cancelled))))))";
+    let folder = Folder::with("testing-worlds", &[("t.esl", text)]);
+    let (status, output) = test(&folder, &["t.esl"]);
+    assert_eq!(status, Some(0), "{output}");
+    assert_eq!(output.matches("all schedules").count(), 2, "{output}");
+}
