@@ -61,12 +61,21 @@ impl HostInput {
     /// # Errors
     /// [`SendError`].
     pub fn try_signal(&self, arguments: Vec<Datum>) -> Result<(), SendError> {
+        self.try_signal_by(|| arguments)
+    }
+
+    /// Signals the input, as [`HostInput::try_signal`], with the arguments that `make` makes: only if there
+    /// is room.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn try_signal_by(&self, make: impl FnOnce() -> Vec<Datum>) -> Result<(), SendError> {
         let request = AdmissionRequest { limit: Some(MOST_SENT), waker: None };
         match self.inbox.admission().poll_admit(&self.name, request) {
             std::task::Poll::Ready(admitted) => admitted?,
             std::task::Poll::Pending => return Err(SendError::Full(self.name.to_string())),
         }
-        self.put(arguments);
+        self.put(make());
         Ok(())
     }
 

@@ -1,4 +1,4 @@
-//! Modules for programs that talk to robots: over Zenoh, with messages of ROS 2.
+//! Modules for ESL programs that talk to robots: Zenoh, and nodes and messages of ROS 2.
 //!
 //! ```
 //! esl_world::add_modules(esl_robots::MODULES);
@@ -6,8 +6,42 @@
 #![forbid(unsafe_code)]
 
 pub mod message;
+mod ros;
+mod zenoh;
 
-use esl_host::HostModule;
+use esl_host::{HostModule, HostRows, Inbox};
 
-/// The modules.
-pub const MODULES: &[HostModule] = &[];
+/// Functions of a module that has none of its own.
+fn none(inbox: &Inbox) -> HostRows {
+    HostRows::new(inbox)
+}
+
+/// The modules. Those whose names begin with `ros-` are parts of `ros`, which requires them.
+pub const MODULES: &[HostModule] = &[
+    HostModule { name: "ros", text: include_str!("../modules/ros.esl"), rows: ros::rows },
+    HostModule { name: "ros-actions", text: include_str!("../modules/ros-actions.esl"), rows: none },
+    HostModule { name: "ros-graph", text: include_str!("../modules/ros-graph.esl"), rows: none },
+    HostModule { name: "ros-node", text: include_str!("../modules/ros-node.esl"), rows: none },
+    HostModule { name: "ros-worlds", text: include_str!("../modules/ros-worlds.esl"), rows: none },
+    HostModule { name: "zenoh", text: include_str!("../modules/zenoh.esl"), rows: self::zenoh::rows },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_function_of_the_host_is_called_by_a_module() {
+        for HostModule { name, text, rows } in MODULES {
+            let rows = rows(&Inbox::new());
+            let defines = text.contains(&format!("(esl::%define-host-functions \"{name}\")"));
+            assert_eq!(defines, rows.iter().next().is_some(), "{name}");
+            for row in rows.iter() {
+                let call = row.name.to_lowercase();
+                let is_called = MODULES.iter().any(|module| module.text.contains(&call));
+                assert!(is_called, "{}", row.name);
+                assert!(row.documentation.ends_with('.'), "{}", row.name);
+            }
+        }
+    }
+}

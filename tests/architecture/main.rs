@@ -130,7 +130,7 @@ fn the_readmes_of_the_libraries_list_their_files() {
         let files = names_of_rows(section(&text, heading));
         assert_eq!(files, loaded, "stdlib/README.md and stdlib/{folder}load-order");
     }
-    for name in ["world"] {
+    for name in ["world", "robots"] {
         let there = modules(&root().join(name).join("modules"));
         let names: BTreeSet<String> = there.iter().map(|name| format!(":{name}")).collect();
         assert_eq!(
@@ -270,7 +270,7 @@ fn words_of_comment<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
 
 #[test]
 fn comments_name_the_thing() {
-    let programs = ["stdlib", "world/modules"].map(|folder| root().join(folder));
+    let programs = ["stdlib", "world/modules", "robots/modules"].map(|folder| root().join(folder));
     let mut found = Vec::new();
     for path in files_below(root().to_path_buf()) {
         let mark = match path.extension().and_then(|extension| extension.to_str()) {

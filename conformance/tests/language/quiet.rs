@@ -71,7 +71,7 @@ fn findings(path: &Path, text: String) -> Vec<String> {
 
 #[test]
 fn examples_and_modules_have_no_warnings() {
-    let folders = ["examples", "world/modules"];
+    let folders = ["examples", "world/modules", "robots/modules"];
     let paths = folders.map(|folder| files(folder, "esl")).concat();
     assert!(paths.len() > 25, "{} files", paths.len());
     let read = |path: &PathBuf| std::fs::read_to_string(path).expect("the file is text");

@@ -104,8 +104,15 @@ fn a_new_project_runs_and_its_tests_pass() {
 fn the_projects_own_files_are_formatted() {
     // Programs that show what the reader refuses cannot be among them.
     let root = esl_conformance::root();
-    let folders =
-        ["stdlib", "world/modules", "examples", "benches", "playground", "commands/eslc/src/new/template"];
+    let folders = [
+        "stdlib",
+        "world/modules",
+        "robots/modules",
+        "examples",
+        "benches",
+        "playground",
+        "commands/eslc/src/new/template",
+    ];
     let folders = folders.into_iter().chain(["conformance/soak"]);
     let programs = std::fs::read_dir(root.join("conformance/programs")).expect("the folder can be listed");
     let programs = programs.map(|entry| entry.expect("the folder can be listed").path());

@@ -46,6 +46,7 @@ mod recording;
 mod replay;
 mod reports;
 mod rights;
+mod robots;
 #[cfg(unix)]
 mod secured;
 #[cfg(unix)]

@@ -27,6 +27,7 @@ mod chapters {
         reference = "reference.md",
         repl = "repl.md",
         replay = "replay.md",
+        robots = "robots.md",
         tasks = "tasks.md",
         testing = "testing.md",
         tools = "tools.md",
