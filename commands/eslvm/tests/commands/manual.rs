@@ -42,6 +42,7 @@ mod cookbook {
         data = "data.md",
         failures = "failures.md",
         knowledge = "knowledge.md",
+        robots = "robots.md",
         tasks = "tasks.md",
         tests = "tests.md",
     }
@@ -55,6 +56,7 @@ mod coming_from {
         erlang = "erlang.md",
         plexil = "plexil.md",
         python = "python.md",
+        rclpy = "rclpy.md",
     }
 }
 
