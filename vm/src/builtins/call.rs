@@ -15,8 +15,7 @@ pub(super) fn funcall(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn apply(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (&list, given) = arguments[1..].split_last().expect("the table asks for two arguments");
-    let mut spread = given.to_vec();
-    let mut rest = list;
+    let (mut spread, mut rest) = (given.to_vec(), list);
     while let Some(pair) = vm.heap.as_cons(rest) {
         if spread.len() == MAX_SPREAD {
             return vm.exchange.program_error(format!("more than {MAX_SPREAD} arguments"));
@@ -25,7 +24,7 @@ pub(super) fn apply(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         rest = pair.cdr;
     }
     if rest.is_true() {
-        return vm.exchange.type_error(list, "LIST");
+        return vm.exchange.type_error(rest, "LIST");
     }
     vm.exchange.charge(spread.len());
     vm.exchange.request_call(arguments[0], &spread);

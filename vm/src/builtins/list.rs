@@ -4,6 +4,7 @@
 //! interrupted; so a circular list is not a hang.
 
 use crate::heap::Heap;
+use crate::number::Int;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -168,8 +169,7 @@ pub(super) fn nth(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn nthcdr(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [skipped, list] = exactly(arguments);
-    let count = vm.integer(skipped)?;
-    if count.is_negative() {
+    if !Int::of(&vm.heap, skipped).is_some_and(|count| !count.is_negative()) {
         return vm.exchange.type_error(skipped, "UNSIGNED-BYTE");
     }
     let count = skipped.as_index().unwrap_or(usize::MAX);

@@ -15,8 +15,7 @@ pub(crate) const MAX_SPREAD: usize = 1 << 20;
 
 /// Replaces the last argument, a list, by its items.
 pub(super) fn spread(vm: &mut Vm, arguments: &mut Arguments) -> Result<(), Exit> {
-    let Some(list) = arguments.pop() else { return Ok(()) };
-    let mut rest = list;
+    let Some(mut rest) = arguments.pop() else { return Ok(()) };
     while let Some(pair) = vm.heap.as_cons(rest) {
         if arguments.len() == MAX_SPREAD {
             return vm.exchange.program_error(format!("more than {MAX_SPREAD} arguments"));
@@ -25,7 +24,7 @@ pub(super) fn spread(vm: &mut Vm, arguments: &mut Arguments) -> Result<(), Exit>
         rest = pair.cdr;
     }
     vm.exchange.charge(arguments.len());
-    if rest.is_true() { vm.exchange.type_error(list, "LIST") } else { Ok(()) }
+    if rest.is_true() { vm.exchange.type_error(rest, "LIST") } else { Ok(()) }
 }
 
 /// Puts arguments in the order of the parameter registers into `arranged`, which is empty: missing ones
