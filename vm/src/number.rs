@@ -7,7 +7,7 @@ pub(crate) use esl_number::{
 };
 use esl_number::{NumberFailure, NumberResult, NumberStop, Numbers};
 
-use crate::raise::{Exit, Expected, Outcome, Raised};
+use crate::raise::{ArithmeticCall, Exit, Expected, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -77,10 +77,14 @@ fn exit(vm: &mut Vm, stop: NumberStop, failure: Option<NumberFailure>) -> Exit {
             vm.exchange.raised = failure.map(|failure| match failure {
                 NumberFailure::Type(datum, expected) => Raised::Type(datum, Expected::Type(expected)),
                 NumberFailure::DivisionByZero(operation, operands) => {
-                    Raised::DivisionByZero(operation, operands)
+                    Raised::DivisionByZero(ArithmeticCall::step(operation, &operands))
                 }
-                NumberFailure::Arithmetic(operation, text) => Raised::Arithmetic(operation, text),
-                NumberFailure::FloatOverflow(operation) => Raised::FloatOverflow(operation),
+                NumberFailure::Arithmetic(operation, text) => {
+                    Raised::Arithmetic(ArithmeticCall::step(operation, &[]), text)
+                }
+                NumberFailure::FloatOverflow(operation) => {
+                    Raised::FloatOverflow(ArithmeticCall::step(operation, &[]))
+                }
             });
             Exit::Raise
         }

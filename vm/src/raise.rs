@@ -5,14 +5,19 @@
 //! frame above the failed instruction; nothing has been unwound. What `%raise` returns takes the place of the
 //! operation's result.
 
+use esl_bytecode::builtin::{BuiltinInfo, Visibility};
 use esl_bytecode::symbol::Symbol;
 use esl_host::Right;
+use esl_number::Int;
 use smallvec::{SmallVec, smallvec};
 
 use crate::heap::{AllocError, Heap};
 use crate::names::Names;
 use crate::names::load::LoadError;
 use crate::value::Value;
+
+/// A limit of indexes that no object reaches.
+const INDEX_LIMIT: usize = Value::FIXNUM_MAX as usize;
 
 /// Arguments of a call.
 pub(crate) type Arguments = SmallVec<[Value; 16]>;
@@ -28,6 +33,27 @@ pub enum Expected {
     Specifier(Value),
     /// The type specifier written here with parentheses, names of `COMMON-LISP` and integers.
     Written(&'static str),
+}
+
+/// An operation of arithmetic that failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ArithmeticCall {
+    /// Name in `COMMON-LISP`.
+    name: &'static str,
+    /// Operands, if they are known.
+    operands: Vec<Value>,
+    /// Whether these are the name and the arguments of the program's call, not those of a step of it.
+    is_call: bool,
+}
+
+impl ArithmeticCall {
+    /// Most operands that a condition lists. Of a call with more of them, the step that failed is named.
+    const MOST_OPERANDS: usize = 64;
+
+    /// A step of an operation: its name, and the operands that are known.
+    pub(crate) fn step(name: &'static str, operands: &[Value]) -> ArithmeticCall {
+        ArithmeticCall { name, operands: operands.to_vec(), is_call: false }
+    }
 }
 
 macro_rules! define_raised {
@@ -77,7 +103,9 @@ define_raised! {
     (heap, names)
     /// The datum is not of the expected type.
     Type(datum: Value, expected: Expected)
-        => cl "TYPE-ERROR" { "DATUM": *datum, "EXPECTED-TYPE": expected.specifier(heap, names)? };
+        => cl "TYPE-ERROR" {
+            "DATUM": *datum, "EXPECTED-TYPE": expected.without(heap, *datum).specifier(heap, names)?
+        };
     /// The value of this special variable is not of the expected type.
     Variable(symbol: Value, datum: Value, expected: Expected)
         => esl "DETAILED-TYPE-ERROR" {
@@ -99,20 +127,26 @@ define_raised! {
                 read_specifier(heap, names, &text)?
             }
         };
-    /// The operation with this name in `COMMON-LISP` divides by zero.
-    DivisionByZero(operation: &'static str, operands: [Value; 2])
+    /// The operation divides by zero.
+    DivisionByZero(operation: ArithmeticCall)
         => cl "DIVISION-BY-ZERO" {
-            "OPERATION": names.intern_cl(heap, operation)?, "OPERANDS": heap.list(operands)?, "TEXT": Value::NIL
+            "OPERATION": names.intern_cl(heap, operation.name)?,
+            "OPERANDS": heap.list(&operation.operands)?,
+            "TEXT": Value::NIL
         };
     /// The result of the operation does not exist or is too large, as a text says.
-    Arithmetic(operation: &'static str, text: String)
+    Arithmetic(operation: ArithmeticCall, text: String)
         => cl "ARITHMETIC-ERROR" {
-            "OPERATION": names.intern_cl(heap, operation)?, "OPERANDS": Value::NIL, "TEXT": heap.alloc_str(text)?
+            "OPERATION": names.intern_cl(heap, operation.name)?,
+            "OPERANDS": heap.list(&operation.operands)?,
+            "TEXT": heap.alloc_str(text)?
         };
     /// The result of the operation is too large for a float.
-    FloatOverflow(operation: &'static str)
+    FloatOverflow(operation: ArithmeticCall)
         => cl "FLOATING-POINT-OVERFLOW" {
-            "OPERATION": names.intern_cl(heap, operation)?, "OPERANDS": Value::NIL, "TEXT": Value::NIL
+            "OPERATION": names.intern_cl(heap, operation.name)?,
+            "OPERANDS": heap.list(&operation.operands)?,
+            "TEXT": Value::NIL
         };
     /// The variable with this name has no value.
     UnboundVariable(symbol: Value) => cl "UNBOUND-VARIABLE" { "NAME": *symbol };
@@ -143,7 +177,7 @@ define_raised! {
     Simple(text: String)
         => cl "SIMPLE-ERROR" {
             "FORMAT-CONTROL": heap.alloc_str("~a")?,
-            "FORMAT-ARGUMENTS": { let text = heap.alloc_str(text)?; heap.list(&[text])? }
+            "FORMAT-ARGUMENTS": { let text = heap.alloc_str(&sentence(text))?; heap.list(&[text])? }
         };
     /// A failure of the given cause, the name of a keyword, and one argument.
     Cause(cause: &'static str, argument: Value)
@@ -168,6 +202,31 @@ define_raised! {
     HeapExhausted => esl "HEAP-EXHAUSTED" {};
 }
 
+impl Raised {
+    /// Notes which call of a builtin has failed, unless that is known. A failure of arithmetic then names it
+    /// and its arguments in the place of a step of its work.
+    pub(crate) fn note_call(&mut self, builtin: &BuiltinInfo, arguments: &[Value]) {
+        let (Raised::DivisionByZero(operation)
+        | Raised::Arithmetic(operation, _)
+        | Raised::FloatOverflow(operation)) = self
+        else {
+            return;
+        };
+        let is_named =
+            builtin.visibility == Visibility::Cl && arguments.len() <= ArithmeticCall::MOST_OPERANDS;
+        if is_named && !operation.is_call {
+            *operation = ArithmeticCall { name: builtin.name, operands: arguments.to_vec(), is_call: true };
+        }
+    }
+}
+
+/// Returns a message of one line as a sentence, with a capital and a full stop.
+fn sentence(text: &str) -> String {
+    let mut rest = text.chars();
+    let first = rest.next().map(char::to_uppercase).into_iter().flatten();
+    first.chain(rest).chain(['.']).collect()
+}
+
 /// A part of a failure, as the collector sees it.
 trait RaisedPart {
     /// Calls `visit` with every value in it.
@@ -180,9 +239,9 @@ impl RaisedPart for Value {
     }
 }
 
-impl RaisedPart for [Value; 2] {
+impl RaisedPart for ArithmeticCall {
     fn visit(&self, visit: &mut dyn FnMut(Value)) {
-        self.iter().copied().for_each(visit);
+        self.operands.iter().copied().for_each(visit);
     }
 }
 
@@ -238,6 +297,16 @@ impl From<AllocError> for Exit {
 }
 
 impl Expected {
+    /// Returns the type that was expected where `datum` is not of it: an integer that is not negative but too
+    /// large for a fixnum was expected to be one.
+    fn without(self, heap: &Heap, datum: Value) -> Expected {
+        let is_large = || !datum.is_fixnum() && Int::of(heap, datum).is_some_and(|n| !n.is_negative());
+        match self {
+            Expected::Type("UNSIGNED-BYTE") if is_large() => Expected::Index(INDEX_LIMIT),
+            _ => self,
+        }
+    }
+
     /// Returns the type specifier.
     fn specifier(self, heap: &mut Heap, names: &mut Names) -> Result<Value, AllocError> {
         match self {

@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 use crate::heap::AllocError;
 use crate::interp::frames::Frame;
 use crate::names::records::frame;
-use crate::raise::{Exit, Outcome, Raised};
+use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::report::{self, NotedFrame};
 use crate::run;
 use crate::task::FailureReport;
@@ -199,7 +199,9 @@ pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let status = arguments[0].as_index().and_then(|status| u8::try_from(status).ok());
-    let Some(status) = status else { return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE") };
+    let Some(status) = status else {
+        return vm.exchange.raise(Raised::Type(arguments[0], Expected::Index(256)));
+    };
     vm.outside.exit_status = Some(status);
     run::abort_others(vm);
     vm.scheduler.task_mut().begin_end(TaskEnd::Aborted);

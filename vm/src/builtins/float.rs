@@ -2,7 +2,7 @@
 
 use crate::number::elementary::{self, Elementary};
 use crate::number::{Int, Ratio, float, power, random, text};
-use crate::raise::{Exit, Outcome, Raised};
+use crate::raise::{ArithmeticCall, Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -97,7 +97,7 @@ pub(super) fn rationalize(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn convert(vm: &mut Vm, op: &'static str, v: Value, from_float: fn(f64) -> Ratio) -> Outcome {
     match vm.heap.as_double(v) {
         Some(x) if x.is_finite() => vm.with_numbers(|numbers| numbers.ratio_value(op, &from_float(x))),
-        Some(_) => vm.exchange.raise(Raised::Arithmetic(op, "the float is not a finite number".into())),
+        Some(_) => not_finite(vm, op, v),
         None if crate::number::is_rational(&vm.heap, v) => Ok(v),
         None => vm.exchange.type_error(v, "REAL"),
     }
@@ -122,13 +122,18 @@ fn the_float(vm: &mut Vm, v: Value) -> Result<f64, Exit> {
     }
 }
 
+fn not_finite<T>(vm: &mut Vm, op: &'static str, v: Value) -> Result<T, Exit> {
+    let operation = ArithmeticCall::step(op, &[v]);
+    vm.exchange.raise(Raised::Arithmetic(operation, "the float is not a finite number".into()))
+}
+
 /// Returns the finite double that `v` is.
 fn finite_float(vm: &mut Vm, op: &'static str, v: Value) -> Result<f64, Exit> {
     let x = the_float(vm, v)?;
     if x.is_finite() {
         return Ok(x);
     }
-    vm.exchange.raise(Raised::Arithmetic(op, "the float is not a finite number".into()))
+    not_finite(vm, op, v)
 }
 
 pub(super) fn decode_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -221,7 +221,12 @@ pub(super) unsafe fn apply_native(
         return vm.exchange.program_error(text);
     }
     // SAFETY: by the contract the arguments are live; no builtin writes to the stack or moves it.
-    vm.natives[usize::from(number)](vm, unsafe { &*arguments })
+    let arguments = unsafe { &*arguments };
+    let result = vm.natives[usize::from(number)](vm, arguments);
+    if let (Err(Exit::Raise), Some(raised)) = (result, &mut vm.exchange.raised) {
+        raised.note_call(info, arguments);
+    }
+    result
 }
 
 /// Calls what a builtin asks for that has come to `exit`: the library's function that takes over from it, or

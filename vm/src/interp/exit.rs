@@ -3,6 +3,8 @@
 //! A failure becomes a call of the library's `%raise` above the failed instruction; nothing has been unwound.
 
 use esl_bytecode::builtin::BUILTINS;
+use esl_bytecode::opcode::{CallTarget, Instr, Opcode};
+use esl_bytecode::operand::Role;
 use esl_bytecode::symbol::Symbol;
 use esl_host::Host;
 
@@ -10,10 +12,11 @@ use super::call::{FramePlace, call, call_requested};
 use super::{Signal, aux_at, failure, word_at};
 use crate::describe::describe;
 use crate::overhead::CollectionPoint;
-use crate::raise::{Exit, Raised};
+use crate::raise::{Arguments, Exit, Raised};
 use crate::saved_pc::SavedPc;
 use crate::schedule::TurnEnd;
 use crate::task::{Shortage, TaskEnd};
+use crate::value::Value;
 use crate::vm::Vm;
 
 /// Live bytes over which a collection goes in the time of a tick, about.
@@ -29,7 +32,10 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
     unsafe {
         match exit {
             Exit::Values => Signal::ReturnAll,
-            Exit::Raise => raise(vm),
+            Exit::Raise => {
+                note_call(vm);
+                raise(vm)
+            }
             Exit::Collect => collect(vm),
             Exit::Unwind => Signal::Unwind,
             Exit::Slowly => take_over(vm),
@@ -60,6 +66,47 @@ unsafe fn take_over(vm: &mut Vm) -> Signal {
         let given = std::ptr::slice_from_raw_parts(vm.cpu.base().add(word.a() + 2), word.b());
         call(vm, function, given, FramePlace::for_instruction(word))
     }
+}
+
+/// Notes in the failure which builtin the instruction at `vm.cpu.pc()` called, or did the work of, and with
+/// which arguments.
+///
+/// # Safety
+/// The contract of [`super::settle`].
+unsafe fn note_call(vm: &mut Vm) {
+    let Some(raised) = &mut vm.exchange.raised else { return };
+    // SAFETY: V1: `pc` is at an instruction, with an aux word if its row says so; V3: operands and arguments
+    // are registers of the frame; V5: the aux word is the number of the builtin.
+    unsafe {
+        let (pc, base) = (vm.cpu.pc(), vm.cpu.base());
+        let word = word_at(pc);
+        let Some(opcode) = word.opcode() else { return };
+        if opcode.callee() == Some(CallTarget::Builtin) {
+            let given = std::slice::from_raw_parts(base.add(word.a() + 2), word.b());
+            raised.note_call(&BUILTINS[aux_at(pc) as usize], given);
+        } else if let Some(builtin) = opcode.builtin() {
+            raised.note_call(builtin.info(), &operands(opcode, pc, base));
+        }
+    }
+}
+
+/// Returns the arguments that the instruction at `pc` gives the builtin in its row.
+///
+/// # Safety
+/// V1, V3: at `pc` is an instruction with this opcode, and the registers that it names are in the frame at
+/// `base`.
+unsafe fn operands(opcode: Opcode, pc: *const u32, base: *mut Value) -> Arguments {
+    let mut operands = Arguments::new();
+    // SAFETY: the contract is the same.
+    unsafe {
+        let aux = if opcode.words() == 2 { aux_at(pc) } else { 0 };
+        Instr::from_words(opcode, *pc, aux).visit_operands(|role| match role {
+            Role::Read(register) => operands.push(*base.add(usize::from(register))),
+            Role::Number(number) => operands.push(Value::small(number)),
+            _ => {}
+        });
+    }
+    operands
 }
 
 /// Calls `%raise` with the failure that is noted.

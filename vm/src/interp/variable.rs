@@ -129,16 +129,26 @@ impl Vm {
         (value != Value::UNBOUND).then_some(value)
     }
 
+    /// Fails because `symbol`, a constant or not a symbol, cannot be `done`: set, or bound.
+    #[cold]
+    fn refuse_constant<T>(&mut self, symbol: Value, done: &str) -> Result<T, Exit> {
+        // NIL and T are not objects.
+        if self.heap.symbol(symbol).is_none() && symbol != Value::NIL && symbol != Value::T {
+            return self.exchange.type_error(symbol, "SYMBOL");
+        }
+        let name = self.describe(symbol);
+        self.exchange.program_error(format!("{name} is a constant and cannot be {done}"))
+    }
+
     /// Sets a special variable in the running task: its binding, or else the global value.
     ///
     /// # Errors
     /// A failure if it is a constant.
     pub(crate) fn set_symbol_value(&mut self, symbol: Value, value: Value) -> Result<(), Exit> {
-        let Some(cell) = self.heap.symbol(symbol) else { return self.exchange.type_error(symbol, "SYMBOL") };
+        let Some(cell) = self.heap.symbol(symbol) else { return self.refuse_constant(symbol, "set") };
         let flags = cell.header.flags;
         if flags & SymbolObject::CONSTANT != 0 {
-            let name = self.heap.string_text(cell.name).unwrap_or_default();
-            return self.exchange.program_error(format!("{name} is a constant and cannot be set"));
+            return self.refuse_constant(symbol, "set");
         }
         if flags & SymbolObject::EVER_BOUND != 0 {
             self.scheduler.points.note_shown();
@@ -170,11 +180,10 @@ impl Vm {
     /// # Errors
     /// A failure if it is a constant, or if there are too many bindings.
     pub(crate) fn bind(&mut self, symbol: Value, value: Value, base: u32) -> Result<(), Exit> {
-        let Some(cell) = self.heap.symbol(symbol) else { return self.exchange.type_error(symbol, "SYMBOL") };
+        let Some(cell) = self.heap.symbol(symbol) else { return self.refuse_constant(symbol, "bound") };
         let flags = cell.header.flags;
         if flags & SymbolObject::CONSTANT != 0 {
-            let name = self.heap.string_text(cell.name).unwrap_or_default();
-            return self.exchange.program_error(format!("{name} is a constant and cannot be bound"));
+            return self.refuse_constant(symbol, "bound");
         }
         if flags & SymbolObject::EVER_BOUND == 0 {
             self.heap.set_flags(symbol, Kind::Symbol, flags | SymbolObject::EVER_BOUND);
