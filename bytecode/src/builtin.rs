@@ -1364,9 +1364,10 @@ macro_rules! for_each_builtin {
             /// Ends a compilation, or lets go of a text; whether there are data left for further calls to
             /// free.
             EndCompilation = eval::end_compilation, internal "%END-COMPILATION" ("handle") shares own;
-            /// Reads a datum: whether there was one, or `:unfinished`; the datum; and the index after it.
-            ReadDatum = reading::read_from_string, internal "%READ-FROM-STRING" ("string &optional start end")
-                shares own;
+            /// Reads a datum: whether there was one, or `:unfinished`; the datum; and the index after it. A
+            /// failure names the place in the string, unless that is a token of another text.
+            ReadDatum = reading::read_from_string, internal "%READ-FROM-STRING"
+                ("string &optional start end is-token") shares own;
             /// Reads a datum from a stream: whether there was one, or `:unfinished`; and the datum.
             ReadStream = reading::read, internal "%READ" ("&optional stream") shares own slowly "%SLOW-READ";
 

@@ -38,6 +38,14 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
+    /// Returns the message and the advice as a sentence, for a text whose places nobody can look up.
+    pub fn sentence(&self) -> String {
+        match &self.help {
+            Some(help) => format!("{}; {help}", self.message),
+            None => self.message.clone(),
+        }
+    }
+
     /// Creates a diagnostic at `span`. The compiler calls this in one place only, `Code::at`, so that every
     /// code it reports is in its table.
     pub fn new(code: &'static str, severity: Severity, message: impl Into<String>, span: Span) -> Diagnostic {

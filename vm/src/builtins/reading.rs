@@ -39,7 +39,13 @@ pub(super) fn read_datum(
     vm.names.check_room(&mut vm.heap)?;
     let read = environment::with_compiler(vm, |vm, compiler| {
         let read = compiler.read(vm, text, start);
-        read.map_err(|diagnostic| ReadFault { text: compiler.render(&diagnostic, name, text), diagnostic })
+        read.map_err(|diagnostic| ReadFault {
+            text: match name {
+                Some(_) => compiler.render(&diagnostic, name, text),
+                None => diagnostic.sentence(),
+            },
+            diagnostic,
+        })
     })?;
     let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
     vm.exchange.charge(end.saturating_sub(start));
@@ -106,7 +112,7 @@ pub(super) enum ReadOutcome {
 /// Fault in a text that is read.
 pub(super) struct ReadFault {
     pub(super) diagnostic: Box<Diagnostic>,
-    /// The diagnostic, drawn for people.
+    /// The diagnostic, drawn for people; as a sentence if the text has no name.
     pub(super) text: String,
 }
 
@@ -134,11 +140,27 @@ pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
                 Ok([status, object, calls]) => {
                     vm.give_values(&[status, object, Value::index(start + characters), calls])
                 }
-                Err(fault) => vm.exchange.raise(Raised::Reader(fault.text)),
+                Err(fault) if optional(arguments, 3).is_true() => {
+                    vm.exchange.raise(Raised::Reader(fault.text))
+                }
+                Err(fault) => {
+                    let bytes = fault.diagnostic.primary.span.start as usize;
+                    let read = text.get(..bytes).unwrap_or(&text).chars().count();
+                    let before = text_between(&vm.heap, string, 0, start + read);
+                    let (line, column) = line_and_column_at_end(&before);
+                    let text = format!("line {line}, column {column}: {}", fault.text);
+                    vm.exchange.raise(Raised::Reader(text))
+                }
             };
         }
         part = part.saturating_mul(2);
     }
+}
+
+/// Returns the line and the column, from 1, of what comes after `text`.
+fn line_and_column_at_end(text: &str) -> (usize, usize) {
+    let line = text.rsplit('\n').next().unwrap_or_default();
+    (1 + text.matches('\n').count(), 1 + line.chars().count())
 }
 
 /// Reads a datum, and takes its characters from the stream.
