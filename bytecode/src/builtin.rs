@@ -1087,6 +1087,8 @@ macro_rules! for_each_builtin {
             /// Returns true if it is reported when the running task fails: unless it belongs to a form, which
             /// is told of its end, or in a cleanup while it ends.
             IsReported = failure::is_reported, internal "%IS-REPORTED" ("") shares own;
+            /// Lends the memory that is kept for cleanups to the running task, which ends with a report.
+            LendReportMemory = failure::lend_report_memory, internal "%LEND-REPORT-MEMORY" ("") shares own;
             /// Ends the running task as failed, with this condition: its text in a few words, and for people
             /// what has happened where, and the line that says that there is no recovery. In a cleanup of a
             /// task that ends already, or that leaves an expired limit, ends the cleanup, and the report goes

@@ -154,6 +154,11 @@ pub(super) fn is_reported(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(is_ending || !belongs_to_form(vm)))
 }
 
+pub(super) fn lend_report_memory(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    vm.lend_cleanup_memory();
+    Ok(Value::NIL)
+}
+
 /// Returns whether the failure of the running task goes to a form, and to nothing else.
 fn belongs_to_form(vm: &Vm) -> bool {
     let task = vm.scheduler.task();

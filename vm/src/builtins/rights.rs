@@ -128,7 +128,7 @@ pub(super) fn narrow_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let value = vm.heap.cons(text, in_force(vm))?;
     let symbol = vm.names.rights;
     if vm.scheduler.task().control.bindings.is_full() {
-        vm.reserve_bindings()?;
+        vm.reserve_bindings(base)?;
     }
     vm.scheduler.task_mut().control.bindings.push(Binding { symbol, value, base });
     Ok(Value::NIL)
@@ -167,7 +167,7 @@ pub(super) fn lend_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     // A function that the program may have put in its place does not get the rights.
     let function = if entry.kind == EntryKind::Recovery { vm.recovery_function(index)? } else { None };
     if vm.scheduler.task().control.bindings.is_full() {
-        vm.reserve_bindings()?;
+        vm.reserve_bindings(base)?;
     }
     vm.scheduler.task_mut().control.bindings.push(Binding { symbol, value, base });
     Ok(function.unwrap_or(known))

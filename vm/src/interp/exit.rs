@@ -203,7 +203,7 @@ fn run_out(vm: &mut Vm, is_call: bool, has_collected: bool) -> Signal {
     if is_call {
         vm.cpu.ticks -= 1;
     }
-    if !vm.heap.open_reserve() {
+    if !vm.heap.open_reserve() && !vm.open_report_memory() {
         vm.leave_reserve(vm.names.known.heap_exhausted);
         return Signal::Unwind;
     }

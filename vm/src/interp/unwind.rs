@@ -48,7 +48,7 @@ fn push(vm: &mut Vm, base: *mut Value, entry: Entry) -> Signal {
     let base = vm.offset_of(base) as u32;
     let mut control = &mut *vm.scheduler.task_mut().control;
     if control.entries.len() == control.entries.capacity() {
-        if let Err(exit) = vm.reserve_entries() {
+        if let Err(exit) = vm.reserve_entries(base) {
             return Signal::Exit(exit);
         }
         control = &mut *vm.scheduler.task_mut().control;

@@ -190,7 +190,7 @@ impl Vm {
         }
         let mut bindings = &mut self.scheduler.task_mut().control.bindings;
         if bindings.is_full() {
-            self.reserve_bindings()?;
+            self.reserve_bindings(base)?;
             bindings = &mut self.scheduler.task_mut().control.bindings;
         }
         bindings.push(Binding { symbol, value, base });

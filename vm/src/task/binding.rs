@@ -73,6 +73,11 @@ impl Bindings {
         self.all.len() == self.all.capacity()
     }
 
+    /// Returns the number of bindings for which there is room.
+    pub(crate) fn capacity(&self) -> usize {
+        self.all.capacity()
+    }
+
     /// Makes room for so many more bindings.
     pub(crate) fn reserve(&mut self, more: usize) {
         self.all.reserve_exact(more);
@@ -87,6 +92,20 @@ impl Bindings {
             if let Some(table) = &mut self.table {
                 table.newest.shrink_to(2 * table.newest.len());
                 table.previous.shrink_to(2 * table.previous.len());
+            }
+        }
+        is_large
+    }
+
+    /// Gives back the room of more than `few` bindings if less than half of it is used. Returns whether it
+    /// has.
+    pub(crate) fn give_back(&mut self, few: usize) -> bool {
+        let is_large = self.all.capacity() > few.max(2 * self.all.len());
+        if is_large {
+            self.all.shrink_to(few);
+            if let Some(table) = &mut self.table {
+                table.newest.shrink_to(few);
+                table.previous.shrink_to(few);
             }
         }
         is_large

@@ -377,6 +377,34 @@ impl Control {
             + self.bindings.bytes()
     }
 
+    /// Returns the words for which there is room among entries and bindings.
+    pub(crate) fn words(&self) -> usize {
+        words_of(self.entries.capacity(), self.bindings.capacity())
+    }
+
+    /// Returns the words that entries and bindings take of these.
+    pub(crate) fn words_in_use(&self) -> usize {
+        words_of(self.entries.len(), self.bindings.len())
+    }
+
+    /// Returns the words that running cleanups take, which need not be asked for.
+    pub(crate) fn words_of_cleanups(&self) -> usize {
+        self.running.len() * size_of::<RunningCleanup>() / size_of::<Value>()
+    }
+
+    /// Gives back the room of entries and bindings if there is twice as much as they need, and more than
+    /// `few`. Returns whether there was.
+    pub(crate) fn give_back(&mut self, few: usize) -> bool {
+        let has_room = self.entries.capacity() > few.max(2 * self.entries.len());
+        if has_room {
+            self.entries.shrink_to(few);
+        }
+        if self.running.capacity() > few.max(2 * self.running.len()) {
+            self.running.shrink_to(few);
+        }
+        self.bindings.give_back(few) | has_room
+    }
+
     /// Gives back most of the room of entries and bindings if it is much too large for those that there are.
     /// Returns whether it was.
     pub(crate) fn trim(&mut self) -> bool {
@@ -384,7 +412,11 @@ impl Control {
         if has_many {
             self.entries.shrink_to(2 * self.entries.len());
         }
-        self.bindings.trim(MANY) | has_many
+        let has_cleanups = self.running.capacity() > MANY && self.running.len() < self.running.capacity() / 4;
+        if has_cleanups {
+            self.running.shrink_to(2 * self.running.len());
+        }
+        self.bindings.trim(MANY) | has_many | has_cleanups
     }
 
     /// Returns the number of its parts: entries, bindings and running cleanups.
@@ -416,6 +448,11 @@ impl Control {
             unwinding.visit(visit);
         }
     }
+}
+
+/// Returns the words that so many entries and bindings take at most.
+fn words_of(entries: usize, bindings: usize) -> usize {
+    (entries * size_of::<Entry>() + bindings * Bindings::BYTES) / size_of::<Value>()
 }
 
 /// Returns the items from `start` to before `end`, as far as they are there, and counts both on from behind
