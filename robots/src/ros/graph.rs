@@ -1,6 +1,6 @@
 //! The graph: the nodes of a domain and their endpoints, as their signs of life tell.
 //!
-//! An endpoint of somebody else's that does not fit one of this node's is told to the program: another type
+//! An endpoint of another node that does not fit one of this node's is told to the program: another type
 //! or another version of it under the same name, a quality of service that does not match, another node of
 //! the same name.
 

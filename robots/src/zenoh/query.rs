@@ -24,7 +24,7 @@ const MOST_REPLIES: usize = 100_000;
 /// Time for which a query without a limit waits.
 const LONGEST: Duration = Duration::from_secs(10 * 365 * 86_400);
 
-/// A query of somebody else's, which the program answers. Without an answer it ends when it is dropped.
+/// A query of another session, which the program answers. Without an answer it ends when it is dropped.
 pub(crate) struct PendingQuery {
     query: Mutex<Option<Query>>,
     requests: Requests,
@@ -217,7 +217,7 @@ pub(crate) fn datum_of_reply(reply: &Reply, form: PayloadForm) -> Option<Datum> 
     .map(|items| items.into_datum())
 }
 
-/// Returns the text of an error that somebody has replied.
+/// Returns the text of an error in a reply.
 pub(crate) fn error_text(error: &zenoh::query::ReplyError) -> String {
     short(&String::from_utf8_lossy(&error.payload().to_bytes()))
 }

@@ -171,7 +171,7 @@ impl ZenohSession {
     /// Opens the session. `input` is signalled when a connection is made or lost.
     ///
     /// # Errors
-    /// `:connection-refused`, if a client reaches nobody; `:address-in-use`; `:zenoh-error`.
+    /// `:connection-refused`, if a client reaches no session; `:address-in-use`; `:zenoh-error`.
     pub(crate) async fn open(
         &self,
         mode: Option<String>,

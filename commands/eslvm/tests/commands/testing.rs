@@ -278,8 +278,8 @@ fn tests_are_run_again_when_a_source_changes() {
     child.wait().expect("it ends");
 }
 
-/// Under all schedules, exclusive calls that are refused are not calls to the world and take no clause, and the
-/// end of a call is noted.
+/// Under all schedules, exclusive calls that are refused are not calls to the world and take no clause, and
+/// the end of a call is noted.
 #[test]
 fn worlds_of_scripts_hold_under_all_schedules() {
     let text = "(define-mock drive (n) (sleep 1) n)
