@@ -72,7 +72,13 @@ fn findings(path: &Path, text: String) -> Vec<String> {
 #[test]
 fn examples_and_modules_have_no_warnings() {
     let folders = ["examples", "world/modules", "robots/modules"];
-    let paths = folders.map(|folder| files(folder, "esl")).concat();
+    let mut paths = folders.map(|folder| files(folder, "esl")).concat();
+    // Parts of the module `ros`, which is compiled with them.
+    let is_part = |path: &PathBuf| {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        path.starts_with(root().join("robots/modules")) && name.starts_with("ros-")
+    };
+    paths.retain(|path| !is_part(path));
     assert!(paths.len() > 25, "{} files", paths.len());
     let read = |path: &PathBuf| std::fs::read_to_string(path).expect("the file is text");
     let found: Vec<String> = paths.iter().flat_map(|path| findings(path, read(path))).collect();
