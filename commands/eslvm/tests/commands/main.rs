@@ -24,8 +24,9 @@ mod http_peers;
 mod http_server;
 #[cfg(unix)]
 mod lines;
-mod manual;
 #[cfg(target_os = "linux")]
+mod manipulator;
+mod manual;
 mod memory;
 mod missions;
 mod modules;

@@ -1,0 +1,130 @@
+//! The executive of an arm clears its table: of scripts in virtual time, and against the simulator in Python.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use esl_conformance::process;
+
+use crate::examples::{PATIENCE, example, free_port};
+use crate::{ESLVM, eslvm};
+
+#[test]
+fn an_arm_of_scripts_is_driven_under_all_schedules() {
+    for (seed, slice) in [("0", "2000"), ("1", "1"), ("2", "7"), ("3", "100")] {
+        let options = ["run", "--clock", "virtual", "--seed", seed, "--slice", slice];
+        let run = process::run(eslvm(&options).arg(example("manipulator/scripted.esl")), "");
+        assert_eq!(run.status, Some(0), "seed {seed}: {}{}", run.output, run.errors);
+        for line in [
+            "the arm stopped",
+            "the camera hangs, resetting it",
+            "lost the blue block",
+            "grasping the blue block across",
+            "percent, charging",
+            "the motors are stopped",
+            "4 of 4 blocks are in the tray, the battery was charged 1 time",
+        ] {
+            assert!(run.output.contains(line), "{line}, seed {seed}: {}", run.output);
+        }
+        assert!(!run.output.contains("RULE BROKEN"), "{}", run.output);
+    }
+}
+
+/// Returns the script that starts simulator and executive; nothing if the simulator cannot be installed.
+fn script() -> Option<Command> {
+    let venv = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("manipulator-venv");
+    let script = example("manipulator/run.sh");
+    let mut command = Command::new(&script);
+    command.env("MANIPULATOR_VENV", &venv).env("ESLVM", ESLVM);
+    let mut install = Command::new(&script);
+    install.arg("--install").env("MANIPULATOR_VENV", &venv);
+    if install.output().is_ok_and(|done| done.status.success()) {
+        return Some(command);
+    }
+    crate::say_left_out("it needs `python3`, its `venv`, and its registry");
+    None
+}
+
+/// The script, and the lines of both programs.
+struct Run {
+    child: Child,
+    lines: Receiver<String>,
+    seen: Vec<String>,
+}
+
+impl Run {
+    fn start(mut command: Command, speed: &str) -> Run {
+        let port = free_port().to_string();
+        command.args(["--speed", speed]).env("MANIPULATOR_PORT", port).stdout(Stdio::piped());
+        let mut child = command.spawn().expect("the script can be started");
+        let output = BufReader::new(child.stdout.take().expect("it is a pipe"));
+        let (send, lines) = channel();
+        std::thread::spawn(move || {
+            for line in output.lines().map_while(Result::ok) {
+                if send.send(line).is_err() {
+                    break;
+                }
+            }
+        });
+        Run { child, lines, seen: Vec::new() }
+    }
+
+    /// Waits until a line has the text.
+    fn wait_for(&mut self, text: &str) {
+        let began = Instant::now();
+        loop {
+            match self.lines.recv_timeout(PATIENCE.saturating_sub(began.elapsed())) {
+                Ok(line) => self.seen.push(line),
+                Err(RecvTimeoutError::Timeout) => panic!("no `{text}` in time: {:#?}", self.seen),
+                Err(RecvTimeoutError::Disconnected) => panic!("no `{text}`: {:#?}", self.seen),
+            }
+            if self.seen.last().is_some_and(|line| line.contains(text)) {
+                return;
+            }
+        }
+    }
+
+    fn has_seen(&self, text: &str) -> bool {
+        self.seen.iter().any(|line| line.contains(text))
+    }
+}
+
+impl Drop for Run {
+    /// The script ends what it has started.
+    fn drop(&mut self) {
+        drop(Command::new("kill").arg(self.child.id().to_string()).status());
+        drop(self.child.wait());
+    }
+}
+
+#[test]
+fn a_simulated_arm_in_another_process_clears_its_table() {
+    let Some(script) = script() else { return };
+    let mut run = Run::start(script, "2");
+    run.wait_for("blocks are in the tray, the battery was charged");
+    assert!(run.has_seen("4 of 4 blocks are in the tray"), "{:#?}", run.seen);
+    for text in
+        ["camera is reset", "lost the green block", "block across", "percent, charging", "motors are stopped"]
+    {
+        assert!(run.has_seen(text), "{text}: {:#?}", run.seen);
+    }
+    assert!(run.child.wait().is_ok_and(|status| status.success()));
+}
+
+#[test]
+fn a_signal_stops_the_motors() {
+    let Some(script) = script() else { return };
+    let mut run = Run::start(script, "1");
+    run.wait_for("arm: gripper closes, holds a block");
+    // The block is lifted now, so that a goal of the controller is under way.
+    std::thread::sleep(Duration::from_millis(700));
+    let began = Instant::now();
+    assert!(Command::new("kill").arg(run.child.id().to_string()).status().is_ok_and(|done| done.success()));
+    run.wait_for("arm: motors are stopped");
+    assert!(began.elapsed() < Duration::from_secs(8), "the motors ran for {:?}", began.elapsed());
+    run.wait_for("s  the motors are stopped");
+    assert_eq!(run.child.wait().ok().and_then(|status| status.code()), Some(143));
+}
