@@ -200,8 +200,15 @@ fn repacked(scalar: Scalar, packed: &PackedVector) -> Option<Datum> {
         PackedVector::Bytes(_) if scalar.is_octet() => packed.clone(),
         PackedVector::Floats(_) if scalar == Scalar::Float64 => packed.clone(),
         PackedVector::Floats(floats) if scalar == Scalar::Float32 => {
-            let rounded = |value: &f64| single(*value);
-            PackedVector::Floats(floats.iter().map(rounded).collect::<Option<_>>()?)
+            let is_inside = |&value: &f64| single(value).is_some();
+            let is_rounded = |&value: &f64| f64::from(value as f32).to_bits() == value.to_bits();
+            match floats.iter().all(is_rounded) {
+                true => packed.clone(),
+                false if floats.iter().all(is_inside) => {
+                    PackedVector::Floats(floats.iter().map(|&value| f64::from(value as f32)).collect())
+                }
+                false => return None,
+            }
         }
         PackedVector::Integers(integers) => {
             let (least, greatest) = scalar.range().filter(|_| !scalar.is_octet())?;
