@@ -89,7 +89,7 @@ fn the_map_lists_every_module() {
 }
 
 /// Most lines of the map, which a newcomer reads in one sitting.
-const MAP_LINES: usize = 265;
+const MAP_LINES: usize = 250;
 
 #[test]
 fn the_map_is_short() {
