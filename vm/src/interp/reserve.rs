@@ -210,9 +210,12 @@ impl Vm {
 
     /// Has the running task, which fails for want of memory, use the memory that is kept for cleanups, so
     /// that its failure is reported although others have used up the reserve. Returns false if something may
-    /// handle the failure, or if the task uses that memory already.
+    /// handle the failure, if a form is told of it instead, or if the task uses that memory already.
     pub(super) fn open_report_memory(&mut self) -> bool {
         let (task, mut steps) = (self.scheduler.task(), 0);
+        if task.notify.is_true() && !task.flags.kept() {
+            return false;
+        }
         let is_handled = task.control.find_handlers(usize::MAX, true, &mut steps).is_some();
         self.exchange.charge(steps);
         if is_handled || self.scheduler.task().flags.uses_cleanup_memory() {
