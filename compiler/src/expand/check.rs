@@ -19,7 +19,7 @@ use super::directive::arguments_of;
 use super::expander::Expander;
 use super::form::{Form, is_known, name, on_one_line, operator, plain};
 use super::global::CauseArguments;
-use super::operation;
+use super::operation_check;
 use super::origin::OriginId;
 use super::trap::traps;
 use crate::diagnostic::code;
@@ -43,9 +43,9 @@ static CHECKS: LazyLock<FxHashMap<Symbol, FormCheck>> = LazyLock::new(|| {
     ];
     let own: &[(&str, FormCheck)] = &[
         ("ASSERT", assert),
-        ("DEFINE-EXCLUSIVE", operation::exclusive),
+        ("DEFINE-EXCLUSIVE", operation_check::exclusive),
         ("FAIL", fail),
-        ("START", operation::start),
+        ("START", operation_check::start),
         ("WITH-RECOVERY-PROCEDURES", recovery),
         ("WITH-CLEANUP-PROCEDURE", body),
         ("WITH-BUDGET", body),
@@ -58,9 +58,9 @@ static CHECKS: LazyLock<FxHashMap<Symbol, FormCheck>> = LazyLock::new(|| {
         ("WITH-RIGHTS", body),
         ("WITH-SUSPENSION-PROCEDURES", body),
         ("WITH-TIMEOUT", body),
-        ("WITH-WORLD", operation::world),
+        ("WITH-WORLD", operation_check::world),
         ("WITHOUT-INTERRUPTS", body),
-        ("%DEFINE-STARTER", operation::starter),
+        ("%DEFINE-STARTER", operation_check::starter),
     ];
     let standard = standard.iter().map(|&(name, check)| (Symbol::cl(name), check));
     let own = own.iter().map(|&(name, check)| (Symbol::esl(name), check));

@@ -10,17 +10,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::function::FunctionName;
 use super::operation::UnitOperations;
+use super::origin::NameUsed;
 use super::trap::GuardianTrap;
 use crate::diagnostic::code;
-
-/// A place at which a global name is used.
-#[derive(Clone, Debug)]
-pub(super) struct NameUsed {
-    /// The place.
-    pub(super) span: Span,
-    /// The macro of the program whose expansion contains the use.
-    pub(super) maker: Option<Symbol>,
-}
 
 /// A call of a global function, or a reference to it.
 #[derive(Debug)]

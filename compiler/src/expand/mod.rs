@@ -101,6 +101,7 @@ mod lambda_list;
 mod local;
 mod modify;
 mod operation;
+mod operation_check;
 pub mod operator;
 mod origin;
 mod place;

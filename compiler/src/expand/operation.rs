@@ -1,7 +1,7 @@
 //! Names that have to be those of operations: in `define-exclusive` and `start`.
 //!
-//! UnitOperations are defined by `define-mock`, by the clauses of a `with-world`, and by the host. A name of
-//! nothing may become one before the form is evaluated, as every undefined name may.
+//! Operations are defined by `define-mock`, by the clauses of a `with-world`, and by the host. A name that is
+//! undefined may become one before the form is evaluated.
 
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::Datum;
@@ -10,10 +10,8 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashSet;
 
-use super::expander::Expander;
-use super::form::{Form, name, operator};
-use super::global::NameUsed;
-use super::origin::OriginId;
+use super::form::name;
+use super::origin::NameUsed;
 use crate::diagnostic::code;
 use crate::similar::is_like;
 
@@ -23,7 +21,7 @@ pub(super) struct OperationUse {
     pub(super) operation: Symbol,
     pub(super) place: NameUsed,
     /// The parameter that `define-exclusive` names, and its place.
-    parameter: Option<(Symbol, Span)>,
+    pub(super) parameter: Option<(Symbol, Span)>,
     /// Whether a form around it handles failures, so that it may be meant to fail.
     pub(super) is_guarded: bool,
 }
@@ -32,9 +30,9 @@ pub(super) struct OperationUse {
 #[derive(Debug, Default)]
 pub(super) struct UnitOperations {
     /// Names that the unit defines as those of operations.
-    defined: FxHashSet<Symbol>,
+    pub(super) defined: FxHashSet<Symbol>,
     /// Names that `define-exclusive` names.
-    exclusive: FxHashSet<Symbol>,
+    pub(super) exclusive: FxHashSet<Symbol>,
     /// Forms that need one.
     pub(super) uses: Vec<OperationUse>,
 }
@@ -95,63 +93,5 @@ impl OperationUse {
                 warning.help(format!("it has {}", known.join(", ")))
             }
         })
-    }
-}
-
-/// `(%define-starter name …)`, of which the expansions of `define-mock` and of the functions of modules have
-/// one for each operation.
-pub(super) fn starter(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
-    if let Some(symbol) = form.args.first().and_then(Datum::as_symbol) {
-        expander.globals.operations.defined.insert(symbol.clone());
-    }
-}
-
-/// `(with-world (clause*) . body)`
-pub(super) fn world(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
-    for clause in form.args.first().into_iter().flat_map(Datum::elements) {
-        let mut parts = clause.elements();
-        let is_answer = parts
-            .next()
-            .and_then(Datum::as_symbol)
-            .is_some_and(|key| key.is_keyword() && matches!(key.name(), "ANSWER" | "NEVER"));
-        if let Some(call) = parts.next().filter(|_| is_answer)
-            && let Some(symbol) = operator(call)
-        {
-            expander.globals.operations.defined.insert(symbol.clone());
-        }
-    }
-}
-
-/// `(start (name …))`
-pub(super) fn start(expander: &mut Expander, _: &dyn Environment, form: &Form, origin: Option<OriginId>) {
-    if let Some((named, _)) = form.args.first().and_then(Datum::as_cons)
-        && let Some(symbol) = named.as_symbol()
-    {
-        expander.note_operation(symbol, form.at(named.span()), None, origin);
-    }
-}
-
-/// `(define-exclusive name [parameter])`
-pub(super) fn exclusive(expander: &mut Expander, _: &dyn Environment, form: &Form, origin: Option<OriginId>) {
-    let Some((named, rest)) = form.args.split_first() else { return };
-    let Some(symbol) = named.as_symbol() else { return };
-    expander.globals.operations.exclusive.insert(symbol.clone());
-    let parameter = rest.first().filter(|parameter| !parameter.is_nil());
-    let parameter =
-        parameter.and_then(|parameter| Some((parameter.as_symbol()?.clone(), form.at(parameter.span()))));
-    expander.note_operation(symbol, form.at(named.span()), parameter, origin);
-}
-
-impl Expander {
-    fn note_operation(
-        &mut self,
-        symbol: &Symbol,
-        span: Span,
-        parameter: Option<(Symbol, Span)>,
-        origin: Option<OriginId>,
-    ) {
-        let place = self.place_of_use(span, origin);
-        let (operation, is_guarded) = (symbol.clone(), self.is_guarded(span));
-        self.globals.operations.uses.push(OperationUse { operation, place, parameter, is_guarded });
     }
 }

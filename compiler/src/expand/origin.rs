@@ -139,3 +139,12 @@ impl Origins {
         is_made && origin.is_some_and(|origin| self.get(origin).is_made_by_standard)
     }
 }
+
+/// A place at which a global name is used.
+#[derive(Clone, Debug)]
+pub(super) struct NameUsed {
+    /// The place.
+    pub(super) span: Span,
+    /// The macro of the program whose expansion contains the use.
+    pub(super) maker: Option<Symbol>,
+}

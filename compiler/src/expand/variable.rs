@@ -8,9 +8,9 @@ use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
 use super::form::{Checked, Form, Make, fresh, is_known, name, on_one_line, plain};
-use super::global::{NameUsed, PendingVariable};
+use super::global::PendingVariable;
 use super::job::{Job, To};
-use super::origin::OriginId;
+use super::origin::{NameUsed, OriginId};
 use super::scope::{ScopeEntry, VariableMeaning, Visible, global_symbol_macro};
 use crate::core::NodeKind;
 use crate::diagnostic::code;
