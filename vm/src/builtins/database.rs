@@ -44,13 +44,16 @@ fn has_locks(vm: &Vm, locks: Value) -> bool {
     Table::of(&vm.heap, locks).is_some_and(|table| table.count(&vm.heap) > 0)
 }
 
+/// The fact that a change was about, and how it went.
+type FactChange<T> = (Value, Result<T, FormulaError>);
+
 /// Changes the facts by the first argument. Returns `None` and does nothing if the second one has locks.
 #[inline]
 fn change_unlocked<T>(
     vm: &mut Vm,
     arguments: &[Value],
     change: impl FnOnce(&mut Database, &mut Heap, Value, &mut usize) -> Result<T, FormulaError>,
-) -> Result<Option<(Value, Result<T, FormulaError>)>, Exit> {
+) -> Result<Option<FactChange<T>>, Exit> {
     let [fact, locks] = exactly(arguments);
     vm.scheduler.point()?;
     if has_locks(vm, locks) {

@@ -169,7 +169,7 @@ pub(super) fn nth(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn nthcdr(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [skipped, list] = exactly(arguments);
-    if !Int::of(&vm.heap, skipped).is_some_and(|count| !count.is_negative()) {
+    if Int::of(&vm.heap, skipped).is_none_or(|count| count.is_negative()) {
         return vm.exchange.type_error(skipped, "UNSIGNED-BYTE");
     }
     let count = skipped.as_index().unwrap_or(usize::MAX);
