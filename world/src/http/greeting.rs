@@ -60,7 +60,7 @@ fn is_known(line: &mut [u8]) -> bool {
         }
         [b'H', b'T', b'T', b'P', b'/', version @ ..] => {
             // Anything else is not a version at all.
-            !matches!(version, [b'0'..=b'9'] | [b'0'..=b'9', b'.', b'0'..=b'9'])
+            !matches!(version, [b'0' | b'2'..=b'9'] | [b'0'..=b'9', b'.', b'0'..=b'9'])
         }
         _ => true,
     }
