@@ -188,9 +188,6 @@ pub enum Required {
     Compiled(Box<Module>),
 }
 
-/// Beginning of the names of the sources of the library.
-pub const LIBRARY_SOURCES: &str = "stdlib/";
-
 /// Beginning of the names of the sources of modules that come with the machine.
 pub const MODULE_SOURCES: &str = "<esl>/";
 

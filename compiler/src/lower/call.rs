@@ -3,7 +3,7 @@
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
-use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
+use esl_bytecode::symbol::Symbol;
 
 use super::builder::FunctionBuilder;
 use super::dest::Dest;
@@ -177,8 +177,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
 
     /// Lowers a call that is not opened up.
     pub(super) fn emit_call(&mut self, target: CallRoute<'a>, arguments: &'a [NodeId], dest: Dest) {
-        let is_kept = matches!(target, CallRoute::Global(name) if fails(name) || self.is_step_of_macro(name));
-        if self.keeps_its_frame(dest) || matches!(dest, Dest::Tail) && is_kept {
+        let fails = matches!(target, CallRoute::Global(name) if fails(name));
+        if self.keeps_its_frame(dest) || matches!(dest, Dest::Tail) && fails {
             self.emit_call(target, arguments, Dest::All);
             return self.finish(Dest::All, dest);
         }
@@ -241,13 +241,6 @@ impl<'a> FunctionBuilder<'_, 'a> {
     /// form.
     fn keeps_its_frame(&self, dest: Dest) -> bool {
         matches!(dest, Dest::Tail) && self.lambda == LambdaId(0)
-    }
-
-    /// Whether a call of a global function in a program is part of what a macro of the library expands to.
-    /// Such a tail call keeps the frame of the program's function: so an internal function of the library
-    /// that runs right above another one was called by it.
-    fn is_step_of_macro(&self, function: &Symbol) -> bool {
-        function.name().starts_with('%') && function.is_in(ESL_PACKAGE) && !self.module.lines.are_of_library()
     }
 
     /// Calls a global function with the arguments that are in a window at the top of the registers.

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
-use esl_bytecode::compile::{LIBRARY_SOURCES, Part};
+use esl_bytecode::compile::Part;
 use esl_bytecode::span::{SourceId, Span};
 
 /// The texts of a compilation, to turn spans into lines. A span that lies in none of them has no line.
@@ -59,11 +59,6 @@ impl SourceLines {
     /// The names of the sources, in the order of their numbers.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.sources.iter().map(|source| source.name.as_str())
-    }
-
-    /// Returns whether they are those of the library.
-    pub fn are_of_library(&self) -> bool {
-        self.sources.first().is_some_and(|source| source.name.starts_with(LIBRARY_SOURCES))
     }
 
     /// Line and column, from 1, of the start of `span`; columns count characters.

@@ -35,7 +35,7 @@ impl Side {
 }
 
 /// Configuration of a session that is not open.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct SessionConfig {
     config: Config,
     connect: Vec<String>,
@@ -51,20 +51,16 @@ fn insert(config: &mut Config, key: &str, value: &str) -> Result<(), HostFailure
     config.insert_json5(key, value).map_err(config_failure)
 }
 
-impl Default for SessionConfig {
-    fn default() -> SessionConfig {
-        SessionConfig { config: Config::default(), connect: Vec::new(), listen: Vec::new(), scouts: false }
-    }
-}
+/// An endpoint of a file: its side, or `None` for the address of scouting, and its text.
+pub(crate) type ConfiguredEndpoint = (Option<Side>, String);
 
 impl SessionConfig {
     /// Returns the configuration that a text in JSON5 describes, and the endpoints in it, which are not part
-    /// of the configuration yet: of each its side and its text. One whose side is `None` is the address of
-    /// scouting.
+    /// of the configuration yet.
     ///
     /// # Errors
     /// `:zenoh-error`.
-    pub(crate) fn of_text(text: &str) -> Result<(SessionConfig, Vec<(Option<Side>, String)>), HostFailure> {
+    pub(crate) fn of_text(text: &str) -> Result<(SessionConfig, Vec<ConfiguredEndpoint>), HostFailure> {
         let mut config = Config::from_json5(text).map_err(config_failure)?;
         let mut endpoints = Vec::new();
         for side in [Side::Connect, Side::Listen] {

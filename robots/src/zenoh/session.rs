@@ -119,7 +119,7 @@ impl Drop for OpenSession {
 }
 
 enum SessionState {
-    New(SessionConfig),
+    New(Box<SessionConfig>),
     Open(Arc<OpenSession>),
     Closed,
 }
@@ -133,7 +133,7 @@ impl HostObject for ZenohSession {
 
 impl Default for ZenohSession {
     fn default() -> ZenohSession {
-        ZenohSession(Mutex::new(SessionState::New(SessionConfig::default())))
+        ZenohSession(Mutex::new(SessionState::New(Box::default())))
     }
 }
 

@@ -40,7 +40,10 @@ impl Vm {
     /// form. The form is one of a text without a name; spans are those in the text.
     pub fn take_refused(&mut self, message: &str) -> Option<Vec<Diagnostic>> {
         let refused = std::mem::take(&mut self.compiler.refused);
-        message.contains(&refused.last()?.message).then_some(refused)
+        // A report begins with a capital.
+        let mut text = refused.last()?.message.chars();
+        text.next();
+        message.contains(text.as_str()).then_some(refused)
     }
 
     /// Begins to compile another unit. Forgets the objects and uninterned symbols of the last one.

@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 
 use super::{code_of, pc_from_value, stubs, word_at};
 use crate::heap::Heap;
-use crate::heap::layout::{CodeObject, SymbolObject};
+use crate::heap::layout::CodeObject;
 use crate::names::load::is_of_library;
 use crate::task::Entry;
 use crate::task::Task;
@@ -17,9 +17,6 @@ use esl_bytecode::opcode::{CallTarget, Opcode};
 /// Words below the first register of a task's outermost frame: the frame of the stub at the task's end has
 /// nothing but its link, and no code of a program stands there.
 const BELOW_FRAMES: usize = 4;
-
-/// Beginning of the names of the functions of the library that take over from builtins.
-const TWIN: &str = "%SLOW-";
 
 /// One frame.
 #[derive(Clone, Copy, Debug)]
@@ -81,16 +78,14 @@ impl<'a> Frame<'a> {
     }
 
     /// Returns whether its function, one of the library, is a step of the function of the library below it:
-    /// that has called it by name, or it is a closure or an internal function, which only the library can
-    /// have called. A public function that the caller was given as a value may have taken the place of one of
-    /// the program, by a tail call; in modules, which hardly do so with each other's functions, it counts as
-    /// a step.
+    /// that has called it by name, or it is a closure, which only the library can have called. A function
+    /// that the caller was given as a value may have taken the place of one of the program, by a tail call;
+    /// in modules, which hardly do so with each other's functions, it counts as a step.
     fn is_step_of(&self, caller: &Frame<'_>, heap: &Heap) -> bool {
         // SAFETY: F2: the function of a frame is a Function.
         let name = unsafe { (*code_of(self.function)).name };
-        let symbol = heap.symbol(name).filter(|symbol| symbol.function == self.function);
-        let is_public = symbol.is_some_and(|symbol| !is_internal(heap, symbol));
-        let is_step = !is_public || self.is_of_module() && caller.is_of_module();
+        let is_global = heap.symbol(name).is_some_and(|symbol| symbol.function == self.function);
+        let is_step = !is_global || self.is_of_module() && caller.is_of_module();
         self.is_called_by_name() || is_step && !stubs::is_return_above(self.return_address())
     }
 
@@ -105,14 +100,6 @@ impl<'a> Frame<'a> {
         // SAFETY: F2: the function of a frame is a Function.
         unsafe { is_of_library(&*code_of(self.function)) }
     }
-}
-
-/// Returns whether a function of the library with this name is internal, so that a tail call of it by the
-/// program keeps the frame of the program's function. A builtin's twin is not: it takes the place of the
-/// builtin, also of one that the program calls.
-fn is_internal(heap: &Heap, symbol: &SymbolObject) -> bool {
-    let name = heap.string_text(symbol.name).unwrap_or_default();
-    name.starts_with('%') && !name.starts_with(TWIN)
 }
 
 /// The frames of a stack, innermost first.

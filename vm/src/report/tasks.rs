@@ -1,6 +1,6 @@
 //! Reports on tasks: the deadlock report, when no task can ever run again, and the tree of all tasks.
 
-use esl_bytecode::compile::{LIBRARY_SOURCES, MODULE_SOURCES, SourcePlace};
+use esl_bytecode::compile::{MODULE_SOURCES, SourcePlace};
 use esl_bytecode::word::Word;
 use esl_host::SurveyedTask;
 use esl_host::machine::task_order;
@@ -24,7 +24,7 @@ const FRAMES: usize = 50;
 
 /// Returns whether a source belongs to the library, or to a module that comes with the machine, by its name.
 pub(super) fn is_of_library(source: &str) -> bool {
-    source.ends_with(".esl") && (source.starts_with(LIBRARY_SOURCES) || source.starts_with(MODULE_SOURCES))
+    source.ends_with(".esl") && (source.starts_with("stdlib/") || source.starts_with(MODULE_SOURCES))
 }
 
 /// Returns the word of the one tail call in some code; `None` if there are several.
