@@ -260,6 +260,7 @@ fn bytes_of(text: &str) -> Vec<u8> {
 }
 
 /// Returns a Python with rosbags; `None`, with a text, if there cannot be one.
+#[allow(clippy::print_stderr, reason = "whoever runs the tests sees what is left out")]
 fn python() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rosbags");
     let python = folder.join("bin/python");

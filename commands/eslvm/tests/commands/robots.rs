@@ -51,7 +51,7 @@ fn python() -> Option<&'static Path> {
     };
     let python = PYTHON.get_or_init(install).as_deref();
     if python.is_none() {
-        eprintln!("left out: {} cannot be installed by python3", PACKAGES.join(", "));
+        crate::say_left_out(&format!("{} cannot be installed by python3", PACKAGES.join(", ")));
     }
     python
 }
