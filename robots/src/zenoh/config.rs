@@ -100,6 +100,11 @@ impl SessionConfig {
         insert(&mut self.config, "mode", &quoted(mode))
     }
 
+    /// Returns the endpoints to which a session connects, as a text.
+    pub(crate) fn peers(&self) -> String {
+        self.connect.join(" or ")
+    }
+
     /// Returns the whole configuration. A client waits at most `milliseconds` for its first connection.
     pub(crate) fn finish(mut self, milliseconds: u64) -> Result<Config, HostFailure> {
         let list = |endpoints: &[String]| {

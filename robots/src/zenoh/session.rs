@@ -183,9 +183,10 @@ impl ZenohSession {
             config.set_mode(mode.as_deref())?;
             Ok(config.clone())
         })?;
+        let peers = config.peers();
         let config = config.finish(milliseconds)?;
         let session = on_zenoh(async move { zenoh::open(config).await }).await?;
-        let session = session.map_err(|error| opening_failure(&error.to_string()))?;
+        let session = session.map_err(|error| opening_failure(&error.to_string(), &peers))?;
         let open = Arc::new(OpenSession {
             session,
             requests: Requests::begin()?,
@@ -245,16 +246,17 @@ impl ZenohSession {
     }
 }
 
-/// Returns the failure for a session that cannot be opened.
-fn opening_failure(reason: &str) -> HostFailure {
-    let cause = if reason.contains("ddress already in use") {
-        "ADDRESS-IN-USE"
-    } else if reason.contains("nable to connect") {
-        "CONNECTION-REFUSED"
-    } else {
-        "ZENOH-ERROR"
-    };
-    HostFailure::new(cause, short(reason))
+/// Returns the failure for a session that cannot be opened, and is to connect to these `peers`.
+fn opening_failure(reason: &str, peers: &str) -> HostFailure {
+    if reason.contains("nable to connect") {
+        let text = format!(
+            "no session of Zenoh answers at {peers}: start one there, such as the router of rmw_zenoh, or wait \
+             for it by :timeout"
+        );
+        return HostFailure::new("CONNECTION-REFUSED", text);
+    }
+    let is_in_use = reason.contains("ddress already in use");
+    HostFailure::new(if is_in_use { "ADDRESS-IN-USE" } else { "ZENOH-ERROR" }, short(reason))
 }
 
 /// Returns a message of Zenoh's without the places in its sources.
