@@ -200,8 +200,7 @@ impl NativeKinds {
     /// Takes away what is not known on another path to a word; returns whether that changed anything.
     fn meet(&mut self, flow: &NativeFlow<'_>, to: usize, kinds: &[Known]) -> bool {
         let live = self.live[to];
-        // Where only one path leads, what was said before is not valid any more: a guess depends on what is
-        // not known.
+        // With one predecessor, earlier guesses are invalid: a guess depends on kinds that are unknown.
         let has_one_predecessor = flow.steps[to].as_ref().is_some_and(|step| !step.is_target);
         if has_one_predecessor && self.before[to].as_deref() != Some(kinds) {
             self.before[to] = None;

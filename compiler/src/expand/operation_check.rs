@@ -10,8 +10,8 @@ use super::form::{Form, operator};
 use super::operation::OperationUse;
 use super::origin::OriginId;
 
-/// `(%define-starter name …)`, of which the expansions of `define-mock` and of the functions of modules have
-/// one for each operation.
+/// `(%define-starter name …)`: the expansions of `define-mock` and of the functions of modules contain one
+/// for each operation.
 pub(super) fn starter(expander: &mut Expander, _: &dyn Environment, form: &Form, _: Option<OriginId>) {
     if let Some(symbol) = form.args.first().and_then(Datum::as_symbol) {
         expander.globals.operations.defined.insert(symbol.clone());

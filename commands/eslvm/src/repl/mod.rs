@@ -149,7 +149,7 @@ struct Repl {
     virtual_time: bool,
     /// The last failure of a form.
     failure: Option<FormFailure>,
-    /// Where forms tell that they wait for the choice of a restart.
+    /// The failures at which forms wait for the choice of a restart.
     held_failures: HeldFailures,
     /// The tasks of forms that do, the newest last.
     held: Vec<TaskId>,
