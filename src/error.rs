@@ -65,6 +65,13 @@ pub enum Error {
     NoMemory(&'static str),
     /// The bytecode is damaged, was made by another version, or breaks a rule of the verifier.
     Refused(LoadError),
+    /// A file cannot be read.
+    Unreadable {
+        /// Name of the file.
+        file: String,
+        /// Reason of the operating system.
+        reason: String,
+    },
     /// The value is not of the type that was asked for.
     NotOfType {
         /// The value, as the program prints it.
@@ -104,6 +111,7 @@ impl fmt::Display for Error {
                 write!(f, "the memory limit leaves no room for {what}: raise `Config::memory`")
             }
             Error::NotOfType { value, expected } => write!(f, "the value {value} is not of type {expected}"),
+            Error::Unreadable { file, reason } => write!(f, "`{file}` cannot be read: {reason}"),
             Error::Ended => f.write_str("the engine is gone"),
             Error::Refused(error) => error.fmt(f),
             Error::NotData(error) => error.fmt(f),

@@ -16,12 +16,17 @@ mod convert;
 mod opaque;
 
 use std::fmt;
+use std::str::FromStr;
 use std::sync::Arc;
 
 use esl_bytecode::BigInt;
 use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
-use esl_bytecode::span::Span;
+use esl_bytecode::span::{SourceId, Span};
 use esl_bytecode::symbol::Symbol;
+use esl_compiler::diagnostic::code;
+use esl_compiler::reader::{BareEnvironment, read_datum};
+
+use crate::error::Error;
 
 #[cfg(feature = "serde")]
 pub use structure::{Structure, StructureError};
@@ -214,6 +219,40 @@ impl Data {
                 }
             }
         }
+    }
+}
+
+impl FromStr for Data {
+    type Err = Error;
+
+    /// Reads a value as programs write it.
+    ///
+    /// ```
+    /// use esl::Data;
+    ///
+    /// let pattern: Data = "(at ?robot (3.5 :north))".parse()?;
+    /// assert_eq!(pattern.to_string(), "(AT ?ROBOT (3.5 :NORTH))");
+    /// for text in ["(at", "", "1 2"] {
+    ///     assert!(text.parse::<Data>().is_err());
+    /// }
+    /// # Ok::<(), esl::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::DoesNotCompile`], also if the text has no value or several.
+    fn from_str(text: &str) -> Result<Data, Error> {
+        let mut environment = BareEnvironment::new();
+        let mut next = |start| {
+            read_datum(&mut environment, text, start).map_err(|fault| Error::DoesNotCompile(vec![*fault]))
+        };
+        let span = |start: usize| Span::new(SourceId::default(), start as u32, text.len() as u32);
+        let (datum, end) = next(0)?;
+        let fault = match datum {
+            None => code::MISSING_DATUM.at(span(0), "expected a value"),
+            Some(datum) if next(end)?.0.is_none() => return Ok(Data::from_datum(&datum)),
+            Some(_) => code::INVALID_TOKEN.at(span(end), "expected the end of the text after one value"),
+        };
+        Err(Error::DoesNotCompile(vec![fault]))
     }
 }
 

@@ -55,7 +55,7 @@ impl Engine {
     /// # Errors
     /// As [`Engine::eval`]; [`Error::NotOfType`] if the value is no function.
     pub fn function(&mut self, text: &str) -> Result<Function, Error> {
-        let value = self.value_of(text)?;
+        let value = self.value_of(text, None)?;
         if self.machine.is_function(value) {
             Ok(Function(self.machine.keep(value)))
         } else {

@@ -161,8 +161,17 @@ impl Handle {
         arguments: impl IntoIterator<Item = Data>,
         goes_first: bool,
     ) -> Reply<T> {
-        let question = Question::Call { function, arguments: data(arguments), goes_first };
-        Reply::of_value(self.sender.ask(question))
+        Reply::of_value(self.ask_pending(function, arguments, goes_first))
+    }
+
+    /// Asks for a call, and returns its answer to come.
+    pub(super) fn ask_pending(
+        &self,
+        function: FunctionRef,
+        arguments: impl IntoIterator<Item = Data>,
+        goes_first: bool,
+    ) -> Pending {
+        self.sender.ask(Question::Call { function, arguments: data(arguments), goes_first })
     }
 }
 
@@ -202,6 +211,11 @@ impl<T: FromData> Reply<T> {
 }
 
 impl<T> Reply<T> {
+    /// Returns the reply that a pending answer will be, as `read` reads it.
+    pub(super) fn new(pending: Pending, read: fn(Answer) -> Result<T, Error>) -> Reply<T> {
+        Reply { pending, read }
+    }
+
     /// Waits for the answer: on another thread than the one that runs the engine.
     ///
     /// # Errors
@@ -243,7 +257,7 @@ fn error_of(answer: Answer) -> Error {
     }
 }
 
-fn read_value<T: FromData>(answer: Answer) -> Result<T, Error> {
+pub(super) fn read_value<T: FromData>(answer: Answer) -> Result<T, Error> {
     match answer {
         Answer::Values(values) => {
             let value = values.first().map_or(Data::Nil, Data::from_datum);

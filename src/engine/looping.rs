@@ -109,6 +109,44 @@ impl Engine {
         Poll::Ended(self.ending_of(outcome))
     }
 
+    /// Has `waker` woken when something has come from outside for tasks that wait, at once if it has already:
+    /// a loop that waits after [`Poll::Idle`] goes on then, or at the time that it names. A waker is woken
+    /// once, and replaces the one before.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use std::task::{Wake, Waker};
+    /// use std::thread::{self, Thread};
+    /// use std::time::Instant;
+    ///
+    /// use esl::Engine;
+    /// use esl::engine::Poll;
+    ///
+    /// struct Unpark(Thread);
+    ///
+    /// impl Wake for Unpark {
+    ///     fn wake(self: Arc<Unpark>) {
+    ///         self.0.unpark();
+    ///     }
+    /// }
+    ///
+    /// let mut engine = Engine::new()?;
+    /// engine.eval("(define-input button)")?;
+    /// let handle = engine.handle();
+    /// let pressed = engine.begin("(wait-for-event button)");
+    /// thread::spawn(move || handle.signal("button", ["red".into()]));
+    /// let waker = Waker::from(Arc::new(Unpark(thread::current())));
+    /// while let Poll::Idle { until: None } = engine.poll(Instant::now(), 10_000) {
+    ///     engine.wake_when_ready(&waker);
+    ///     thread::park();
+    /// }
+    /// assert_eq!(pressed.wait()?.as_str(), Some("red"));
+    /// # Ok::<(), esl::Error>(())
+    /// ```
+    pub fn wake_when_ready(&self, waker: &Waker) {
+        self.machine.inbox().wake_when_rung(waker);
+    }
+
     fn ending_of(&mut self, outcome: RunOutcome) -> Ending {
         self.machine.flush();
         match (outcome, self.machine.exit_status()) {

@@ -20,14 +20,15 @@ mod call;
 mod executor;
 mod function;
 mod handle;
+mod loading;
 mod looping;
 mod operation;
+mod query;
 
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_host::{Host, HostRows, Inbox, RealHost};
 use esl_vm::embed::HostFunction;
@@ -45,6 +46,7 @@ pub use function::{Callable, Function};
 pub use handle::{Handle, Reply, TaskHandle};
 pub use looping::{Ending, Poll, Running};
 pub use operation::Operation;
+pub use query::QueryAnswer;
 
 /// A machine with the library. Definitions last from one evaluation to the next.
 ///
@@ -279,17 +281,7 @@ impl Engine {
     /// # Errors
     /// All of [`Error`] but [`Error::Refused`] and [`Error::InvalidName`].
     pub fn eval(&mut self, text: &str) -> Result<Data, Error> {
-        let value = self.value_of(text)?;
-        Ok(Data::from_datum(&self.machine.export(value)?))
-    }
-
-    /// Evaluates the forms of a text, and returns the first value of the last form.
-    fn value_of(&mut self, text: &str) -> Result<Value, Error> {
-        let datum = Datum::string(text, Default::default());
-        let text = self.machine.import(&datum).map_err(|_| Error::NoMemory("the text"))?;
-        let function = self.machine.library_function("%EVAL-TEXT")?;
-        let result = self.machine.call(function, &[text], self.ticks);
-        self.first_value(result)
+        self.eval_as(text, None)
     }
 
     /// Returns the first of the values of a call.
