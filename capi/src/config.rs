@@ -1,0 +1,162 @@
+//! Settings of an engine that is to be made.
+
+use std::cell::RefCell;
+use std::ffi::c_char;
+use std::ptr;
+
+use esl::Config;
+use esl::host::{RealHost, Right, Rights};
+
+use crate::border::{freeing, guarded, look, making, take, text};
+use crate::failure::{Fault, esl_failure};
+use crate::status::esl_status::{self, ESL_INVALID_ARGUMENT};
+
+/// Settings for engines: limits, rights, clock. A new one has the defaults: a gigabyte of memory, no rights,
+/// real time. One thread at a time.
+pub struct esl_config(RefCell<Settings>);
+
+#[derive(Clone, Default)]
+pub(crate) struct Settings {
+    pub(crate) machine: Config,
+    pub(crate) ticks: Option<u64>,
+    rights: Rights,
+    has_virtual_time: bool,
+}
+
+impl Settings {
+    /// Returns the settings that C holds, or the defaults for null.
+    ///
+    /// # Safety
+    /// The pointer is null, or to settings that are not freed meanwhile.
+    pub(crate) unsafe fn of(config: *const esl_config) -> Result<Settings, Fault> {
+        if config.is_null() {
+            return Ok(Settings::default());
+        }
+        // SAFETY: each pointer is null, or to what C holds and lends.
+        Ok(unsafe { look(config) }?.0.borrow().clone())
+    }
+
+    pub(crate) fn host(&self) -> RealHost {
+        let host = RealHost::new(Vec::new()).with_rights(self.rights.clone());
+        if self.has_virtual_time { host.with_virtual_time() } else { host }
+    }
+}
+
+/// Creates settings with the defaults.
+#[unsafe(no_mangle)]
+pub extern "C" fn esl_config_new() -> *mut esl_config {
+    making(|| Ok(esl_config(RefCell::default())))
+}
+
+/// Frees settings; null is ignored. Engines that were made with them keep theirs.
+///
+/// # Safety
+/// `config` was not freed before.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_config_free(config: *mut esl_config) {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    freeing(|| drop(unsafe { take(config) }));
+}
+
+/// Changes settings.
+///
+/// # Safety
+/// `config` is settings, or null.
+unsafe fn change(config: *const esl_config, change: impl FnOnce(&mut Settings)) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe {
+        guarded(ptr::null_mut(), || {
+            change(&mut look(config)?.0.borrow_mut());
+            Ok(())
+        })
+    }
+}
+
+/// Limits the memory of a program, in bytes.
+///
+/// # Safety
+/// `config` is settings, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_config_set_memory(config: *const esl_config, bytes: usize) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe { change(config, |settings| settings.machine.memory = bytes) }
+}
+
+/// Limits the ticks (calls and turns of loops) of the whole run.
+///
+/// # Safety
+/// `config` is settings, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_config_set_budget(config: *const esl_config, ticks: u64) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe { change(config, |settings| settings.machine.budget = Some(ticks)) }
+}
+
+/// Limits the ticks of each evaluation.
+///
+/// # Safety
+/// `config` is settings, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_config_set_ticks(config: *const esl_config, ticks: u64) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe { change(config, |settings| settings.ticks = Some(ticks)) }
+}
+
+/// Sets the seed of all random choices.
+///
+/// # Safety
+/// `config` is settings, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_config_set_seed(config: *const esl_config, seed: u64) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe { change(config, |settings| settings.machine.seed = seed) }
+}
+
+/// Makes time virtual, so that it passes only while all tasks wait; or real.
+///
+/// # Safety
+/// `config` is settings, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_config_set_virtual_time(
+    config: *const esl_config,
+    is_virtual: bool,
+) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe { change(config, |settings| settings.has_virtual_time = is_virtual) }
+}
+
+/// Grants a right, as the options `--allow-…` of the commands do: "net=127.0.0.1:1883" grants access to that
+/// address, "read" to all files. The rights are read, write, net, run, env and serial.
+///
+/// # Safety
+/// `config` is settings; `right` is a text with a null character at its end; `failure` is a place that can be
+/// written, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_config_allow(
+    config: *const esl_config,
+    right: *const c_char,
+    failure: *mut *mut esl_failure,
+) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe {
+        guarded(failure, || {
+            let mut settings = look(config)?.0.borrow_mut();
+            let text = text(right, "right")?;
+            let (name, object) = match text.split_once('=') {
+                Some((name, object)) => (name, Some(object)),
+                None => (text, None),
+            };
+            let Some(right) = Right::of_name(name) else {
+                let names = Right::ALL.map(Right::name).join(", ");
+                let message = format!("`{name}` is not a right: expected one of {names}");
+                return Err(Fault::new(ESL_INVALID_ARGUMENT, message));
+            };
+            let rights = std::mem::take(&mut settings.rights);
+            settings.rights = match object {
+                Some(object) => rights.with(right, object),
+                None => rights.with_all(right),
+            };
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,33 @@
+//! The C API of ESL: what `include/esl.h` declares.
+//!
+//! | module | content |
+//! | --- | --- |
+//! | `border` | pointers from C, objects for C, panics |
+//! | `status`, `failure` | the outcome of a call, and its reason |
+//! | `value` | values of programs |
+//! | `config`, `engine` | engines: limits, rights, evaluation, the loop |
+//! | `function`, `operation` | functions and operations that C implements |
+//! | `handle`, `reply` | other threads, and answers to come |
+//! | `wakeup` | the file descriptor that a loop waits for |
+//!
+//! Guarantees: no panic leaves a function. Every pointer may be null. Nothing here is known to a program that
+//! embeds the language in Rust: everything goes through the crate `esl`.
+//!
+//! Unsafe code is at the border only: what a function asks of its caller stands under "Safety", and each
+//! block relies on that.
+
+#![allow(unsafe_code)]
+#![expect(non_camel_case_types, reason = "the names are those of C")]
+#![expect(missing_debug_implementations, reason = "C knows the objects as pointers")]
+
+mod border;
+pub mod config;
+pub mod engine;
+pub mod failure;
+pub mod function;
+pub mod handle;
+pub mod operation;
+pub mod reply;
+pub mod status;
+pub mod value;
+mod wakeup;

@@ -1,0 +1,301 @@
+/* What the API promises, call by call: each check prints its line if it does not hold. */
+#include "esl.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int faults = 0;
+
+#define CHECK(condition)                                                  \
+    do {                                                                  \
+        if (!(condition)) {                                               \
+            printf("line %d: %s\n", __LINE__, #condition);                \
+            faults++;                                                     \
+        }                                                                 \
+    } while (0)
+
+static esl_engine *new_engine(const esl_config *config) {
+    esl_engine *engine = NULL;
+    CHECK(esl_engine_new(config, &engine, NULL) == ESL_OK);
+    return engine;
+}
+
+/* Evaluates a text. Returns its value as the program prints it, for `free_text`; or its cause. */
+static char *eval(esl_engine *engine, const char *text) {
+    esl_value *value = NULL;
+    esl_failure *failure = NULL;
+    char *printed;
+    if (esl_eval(engine, text, &value, &failure) == ESL_OK) {
+        printed = esl_value_print(value);
+    } else {
+        esl_value *cause = esl_string(esl_failure_cause(failure));
+        printed = esl_value_text(cause);
+        esl_value_free(cause);
+    }
+    esl_value_free(value);
+    esl_failure_free(failure);
+    return printed;
+}
+
+static int gives(esl_engine *engine, const char *text, const char *expected) {
+    char *printed = eval(engine, text);
+    int is_equal = printed != NULL && strcmp(printed, expected) == 0;
+    if (!is_equal) printf("%s gives %s, not %s\n", text, printed ? printed : "nothing", expected);
+    esl_text_free(printed);
+    return is_equal;
+}
+
+static void values(void) {
+    int64_t integer = 0;
+    double number = 0;
+    size_t length = 0;
+    esl_value *value = esl_integer(-5);
+    CHECK(esl_value_kind(value) == ESL_INTEGER);
+    CHECK(esl_value_integer(value, &integer) && integer == -5);
+    CHECK(esl_value_float(value, &number) && number == -5.0);
+    CHECK(esl_value_item(value, 0) == NULL && esl_value_count(value) == 0);
+    esl_value_free(value);
+
+    const double floats[] = {0.5, -1.0};
+    value = esl_floats(floats, 2);
+    const double *shown = esl_value_floats(value, &length);
+    CHECK(length == 2 && shown[0] == 0.5 && shown[1] == -1.0);
+    CHECK(esl_value_bytes(value, &length) == NULL && length == 0);
+    esl_value_free(value);
+
+    CHECK(esl_value_read("(1 . 2)", &value, NULL) == ESL_OK);
+    CHECK(esl_value_kind(value) == ESL_DOTTED_LIST && esl_value_count(value) == 2);
+    CHECK(esl_value_integer(esl_value_item(value, 1), &integer) && integer == 2);
+    esl_value_free(value);
+
+    value = esl_string_of_length("a\0b", 3);
+    const uint8_t *bytes = esl_value_text_bytes(value, &length);
+    CHECK(length == 3 && memcmp(bytes, "a\0b", 3) == 0);
+    char *text = esl_value_text(value);
+    CHECK(strcmp(text, "a\xEF\xBF\xBD" "b") == 0);
+    esl_text_free(text);
+    esl_value_free(value);
+    CHECK(esl_string("\xFF") == NULL);
+
+    esl_value *items[] = {esl_keyword("on"), esl_symbol("valve"), esl_boolean(true), esl_nil()};
+    value = esl_list((const esl_value *const *)items, 4);
+    for (int i = 0; i < 4; i++) esl_value_free(items[i]);
+    text = esl_value_print(value);
+    CHECK(strcmp(text, "(:ON VALVE T NIL)") == 0);
+    esl_text_free(text);
+    esl_value *copy = esl_value_copy(value);
+    esl_value_free(value);
+    CHECK(esl_value_count(copy) == 4);
+    esl_value_free(copy);
+}
+
+/* (add a b), which fails for negative numbers. */
+static esl_failure *add(void *user, const esl_value *const *arguments, size_t count, esl_value **result) {
+    int64_t a = 0, b = 0;
+    *(int *)user += (int)count;
+    if (!esl_value_integer(arguments[0], &a) || !esl_value_integer(arguments[1], &b)) {
+        return esl_failure_new("not-integers", arguments, count);
+    }
+    *result = esl_integer(a + b);
+    return NULL;
+}
+
+static void note_end(void *user) { *(int *)user = -1; }
+
+static esl_failure *call_back(void *user, const esl_value *const *arguments, size_t count, esl_value **result) {
+    (void)arguments, (void)count, (void)result;
+    esl_failure *failure = NULL;
+    CHECK(esl_eval(user, "1", NULL, &failure) == ESL_BUSY);
+    CHECK(strstr(esl_failure_message(failure), "use a handle") != NULL);
+    CHECK(esl_engine_free(user) == ESL_BUSY);
+    return failure;
+}
+
+static void functions(void) {
+    int user = 0;
+    esl_engine *engine = new_engine(NULL);
+    CHECK(esl_define(engine, "add", "(a b)", "The sum.", add, &user, note_end, NULL) == ESL_OK);
+    CHECK(gives(engine, "(add 40 2)", "42"));
+    CHECK(user == 2);
+    CHECK(gives(engine, "(add 1 :two)", ":NOT-INTEGERS"));
+    CHECK(gives(engine, "(handler-case (add 1 :two) (failure (f) (failure-arguments f)))", "(1 :TWO)"));
+    CHECK(esl_define(engine, "again", "()", "", call_back, engine, NULL, NULL) == ESL_OK);
+    CHECK(gives(engine, "(again)", ":BUSY"));
+    CHECK(gives(engine, "(add 20 2)", "22"));
+    int other = 0;
+    CHECK(esl_define(engine, "not a name", "()", "", add, &other, note_end, NULL) == ESL_INVALID_ARGUMENT);
+    CHECK(other == -1);
+    CHECK(esl_engine_free(engine) == ESL_OK);
+    CHECK(user == -1);
+}
+
+static void failures(void) {
+    esl_engine *engine = new_engine(NULL);
+    esl_failure *failure = NULL;
+    CHECK(esl_eval(engine, "(list 1", NULL, &failure) == ESL_DOES_NOT_COMPILE);
+    CHECK(strstr(esl_failure_message(failure), "unclosed-list") != NULL);
+    esl_failure_free(failure);
+
+    const char *text = "(defun open-valve (n) (fail :stuck n \"left\") n) (list (open-valve 3))";
+    CHECK(esl_eval(engine, text, NULL, &failure) == ESL_FAILED);
+    CHECK(strcmp(esl_failure_cause(failure), ":STUCK") == 0);
+    CHECK(esl_failure_argument_count(failure) == 2 && esl_failure_argument(failure, 2) == NULL);
+    CHECK(esl_value_kind(esl_failure_argument(failure, 1)) == ESL_STRING);
+    esl_frame frame;
+    size_t index = 0;
+    while (esl_failure_frame(failure, index, &frame) && frame.is_of_library) index++;
+    CHECK(index < esl_failure_frame_count(failure));
+    CHECK(strcmp(frame.function, "OPEN-VALVE") == 0 && strcmp(frame.task, "") != 0);
+    CHECK(!esl_failure_frame(failure, 1000, &frame));
+    esl_failure_free(failure);
+    CHECK(esl_load(engine, "/no/such/file.esl", NULL, &failure) == ESL_UNREADABLE);
+    CHECK(strstr(esl_failure_message(failure), "/no/such/file.esl") != NULL);
+    esl_failure_free(failure);
+    esl_engine_free(engine);
+}
+
+static void limits_and_rights(void) {
+    esl_config *config = esl_config_new();
+    esl_failure *failure = NULL;
+    CHECK(esl_config_set_memory(config, 32 << 20) == ESL_OK);
+    CHECK(esl_config_set_ticks(config, 100000) == ESL_OK);
+    CHECK(esl_config_set_virtual_time(config, true) == ESL_OK);
+    CHECK(esl_config_allow(config, "fly=high", &failure) == ESL_INVALID_ARGUMENT);
+    CHECK(strstr(esl_failure_message(failure), "`fly` is not a right") != NULL);
+    esl_failure_free(failure);
+    CHECK(esl_config_allow(config, "env=ESL_TEST", NULL) == ESL_OK);
+    esl_engine *engine = new_engine(config);
+    esl_config_free(config);
+    CHECK(gives(engine, "(loop)", ":BUDGET-SPENT"));
+    CHECK(gives(engine, "(progn (sleep 3600) (now))", "3600.0"));
+    CHECK(gives(engine, "(wait-for-event (make-event))", ":DEADLOCKED"));
+    CHECK(gives(engine, "(with-open-file (s \"/etc/passwd\") (read-line s))", ":PERMISSION-DENIED"));
+    esl_engine_free(engine);
+}
+
+static atomic_int is_over;
+
+/* Another thread: signals, facts, a call. */
+static void *operate(void *argument) {
+    esl_handle *handle = argument;
+    esl_value *fact = NULL;
+    esl_reply *reply = NULL;
+    esl_value *answer = NULL;
+    esl_value_read("(at rover ridge)", &fact, NULL);
+    CHECK(esl_handle_assert(handle, fact, &reply, NULL) == ESL_OK);
+    CHECK(esl_reply_wait(reply, &answer, NULL) == ESL_OK && esl_value_is_true(answer));
+    esl_value_free(answer);
+    CHECK(esl_reply_wait(reply, &answer, NULL) == ESL_ENDED);
+    esl_reply_free(reply);
+    esl_value_free(fact);
+
+    esl_value_read("(at ?robot ?place)", &fact, NULL);
+    CHECK(esl_handle_query(handle, fact, &reply, NULL) == ESL_OK);
+    CHECK(esl_reply_wait(reply, &answer, NULL) == ESL_OK);
+    char *text = esl_value_print(answer);
+    CHECK(strcmp(text, "((:ROBOT ROVER :PLACE RIDGE))") == 0);
+    esl_text_free(text);
+    esl_value_free(answer);
+    esl_reply_free(reply);
+    esl_value_free(fact);
+
+    esl_value *seven = esl_integer(7);
+    const esl_value *arguments[] = {seven};
+    CHECK(esl_handle_call(handle, "double", arguments, 1, &reply, NULL) == ESL_OK);
+    CHECK(esl_reply_wait(reply, &answer, NULL) == ESL_OK);
+    CHECK(esl_handle_signal(handle, "no-such-input", arguments, 1, true, NULL) == ESL_INVALID_ARGUMENT);
+    const esl_value *doubled[] = {answer};
+    CHECK(esl_handle_signal(handle, "commands", doubled, 1, true, NULL) == ESL_OK);
+    esl_value_free(answer);
+    esl_value_free(seven);
+    esl_reply_free(reply);
+
+    esl_task *task = NULL;
+    CHECK(esl_handle_spawn(handle, "patrol", NULL, 0, &task, NULL) == ESL_OK);
+    CHECK(esl_task_abort(task) == ESL_OK);
+    reply = esl_task_into_reply(task);
+    CHECK(esl_reply_wait(reply, &answer, NULL) == ESL_ABORTED);
+    esl_reply_free(reply);
+    esl_handle_free(handle);
+    atomic_store(&is_over, 1);
+    return NULL;
+}
+
+static void threads(void) {
+    esl_engine *engine = new_engine(NULL);
+    CHECK(gives(engine,
+                "(progn (define-input commands :capacity 9) (defun double (n) (* 2 n))"
+                "       (defun patrol () (loop (sleep 0.01))) 1)",
+                "1"));
+    esl_handle *handle = NULL;
+    CHECK(esl_engine_handle(engine, &handle, NULL) == ESL_OK);
+    pthread_t thread;
+    CHECK(pthread_create(&thread, NULL, operate, esl_handle_copy(handle)) == 0);
+    CHECK(gives(engine, "(wait-for-event commands)", "14"));
+    esl_handle_free(handle);
+    /* An engine answers only while it runs. */
+    esl_progress progress = {ESL_DONE, 0, -1};
+    while (!atomic_load(&is_over)) CHECK(esl_run(engine, &progress, NULL) == ESL_OK);
+    CHECK(progress.state == ESL_DONE);
+    pthread_join(thread, NULL);
+    esl_engine_free(engine);
+}
+
+/* What bad use gets: a status, and a text that says what to do. */
+static void bad_use(void) {
+    esl_failure *failure = NULL;
+    CHECK(esl_eval(NULL, "1", NULL, &failure) == ESL_INVALID_ARGUMENT);
+    CHECK(strstr(esl_failure_message(failure), "`esl_engine`") != NULL);
+    esl_failure_free(failure);
+    esl_engine *engine = new_engine(NULL);
+    CHECK(esl_eval(engine, NULL, NULL, NULL) == ESL_INVALID_ARGUMENT);
+    CHECK(esl_eval(engine, "\xFF", NULL, NULL) == ESL_INVALID_ARGUMENT);
+    CHECK(esl_call(engine, "list", NULL, 3, NULL, NULL) == ESL_INVALID_ARGUMENT);
+    CHECK(esl_define(engine, "f", "()", "", NULL, NULL, NULL, NULL) == ESL_INVALID_ARGUMENT);
+    esl_reply *reply = NULL;
+    esl_handle *handle = NULL;
+    CHECK(esl_begin(engine, "(list 1)", &reply, NULL) == ESL_OK);
+    CHECK(esl_reply_take(reply, NULL, NULL) == ESL_PENDING);
+    CHECK(esl_engine_handle(engine, &handle, NULL) == ESL_OK);
+    CHECK(esl_engine_free(engine) == ESL_OK);
+    CHECK(esl_reply_wait(reply, NULL, NULL) == ESL_ENDED);
+    esl_reply_free(reply);
+    esl_value *value = esl_integer(1);
+    CHECK(esl_handle_signal(handle, "x", NULL, 0, true, NULL) != ESL_OK);
+    CHECK(esl_handle_pause(handle) == ESL_OK);
+    esl_handle_free(handle);
+#ifdef ESL_CHECKS_FREED
+    CHECK(esl_eval(engine, "1", NULL, &failure) == ESL_INVALID_ARGUMENT);
+    CHECK(strstr(esl_failure_message(failure), "freed before") != NULL);
+    esl_failure_free(failure);
+    CHECK(esl_engine_free(engine) == ESL_INVALID_ARGUMENT);
+    esl_value_free(value);
+#endif
+    esl_value_free(value);
+}
+
+/* Many engines, made and dropped. */
+static void engines(void) {
+    for (int i = 0; i < 20; i++) {
+        esl_engine *engine = new_engine(NULL);
+        CHECK(gives(engine, "(+ 1 2)", "3"));
+        CHECK(esl_engine_free(engine) == ESL_OK);
+    }
+}
+
+int main(void) {
+    CHECK(strlen(esl_version()) >= 5);
+    values();
+    functions();
+    failures();
+    limits_and_rights();
+    threads();
+    bad_use();
+    engines();
+    printf("%d faults\n", faults);
+    return faults != 0;
+}

@@ -1,0 +1,102 @@
+//! Programs in C against the library: compiled by the system's compilers, and watched by valgrind if it is
+//! there.
+#![forbid(unsafe_code)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The folder with the library: that of the test, or the one above it.
+fn library_folder() -> PathBuf {
+    let test = std::env::current_exe().expect("the test is a file");
+    let folders = test.ancestors().skip(1).take(2);
+    let folder = folders.into_iter().find(|folder| folder.join("libesl_capi.so").is_file());
+    folder.expect("cargo builds the library for its tests").to_owned()
+}
+
+/// Compiles a program, and runs it by a command in front of it.
+fn run(source: &str, compiler: &[&str], before: &[&str]) -> Option<Output> {
+    let folder = library_folder();
+    let program = folder.join(format!("capi-{}", source.replace(['/', '.'], "-")));
+    let (name, flags) = compiler.split_first().expect("there is a compiler");
+    let compiled = Command::new(name)
+        .args(flags)
+        .args(["-Wall", "-Wextra", "-Werror", "-g", "-pthread", "-I"])
+        .arg(root().join("include"))
+        .arg(root().join(source))
+        .arg("-L")
+        .arg(&folder)
+        .args(["-lesl_capi", "-o"])
+        .arg(&program)
+        .arg(format!("-Wl,-rpath,{}", folder.display()))
+        .output()
+        .ok()?;
+    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    let mut command = match before.split_first() {
+        Some((name, arguments)) => {
+            let mut command = Command::new(name);
+            command.args(arguments).arg(&program);
+            command
+        }
+        None => Command::new(&program),
+    };
+    command.output().ok()
+}
+
+/// Flags of C, and that builds with debug assertions refuse what was freed before.
+const C: [&str; 4] = ["cc", "-std=c11", "-D_GNU_SOURCE", "-DESL_CHECKS_FREED"];
+
+/// Runs a program that ends with status 0, and returns its output.
+fn output(source: &str, before: &[&str]) -> Option<String> {
+    let run = run(source, &C, before)?;
+    let text = String::from_utf8_lossy(&run.stdout).into_owned();
+    assert!(run.status.success(), "{text}\n{}", String::from_utf8_lossy(&run.stderr));
+    Some(text)
+}
+
+#[test]
+fn the_header_is_that_of_the_sources() {
+    let config = cbindgen::Config::from_file(root().join("cbindgen.toml")).expect("it is a configuration");
+    let bindings = cbindgen::Builder::new().with_crate(root()).with_config(config).generate();
+    let mut made = Vec::new();
+    bindings.expect("the sources can be read").write(&mut made);
+    let made =
+        String::from_utf8(made).expect("it is text").replace("# Safety\n", "The caller sees to it that\n");
+    let file = root().join("include/esl.h");
+    if std::env::var_os("ESL_BLESS").is_some() {
+        std::fs::write(&file, &made).expect("it can be written");
+    }
+    let kept = std::fs::read_to_string(&file).unwrap_or_default();
+    assert!(kept == made, "include/esl.h is old: ESL_BLESS=1 cargo test -p esl-capi");
+}
+
+#[test]
+fn the_example_ends_its_mission() {
+    let text = output("examples/rover.c", &[]).expect("there is a C compiler");
+    let expected = "obstacle after 4 m, once more\ndrove 10 m\ndrove 20 m\ndrove 30 m\n\
+                    the mission ended with :ALL-LEGS\n";
+    assert_eq!(text, expected);
+}
+
+#[test]
+fn the_api_keeps_its_promises() {
+    assert_eq!(output("tests/api.c", &[]).as_deref(), Some("0 faults\n"));
+}
+
+#[test]
+fn nothing_is_read_after_its_end_or_lost() {
+    let valgrind = [
+        "valgrind",
+        "-q",
+        "--leak-check=full",
+        "--show-leak-kinds=definite",
+        "--errors-for-leak-kinds=definite",
+        "--error-exitcode=9",
+    ];
+    if output("tests/api.c", &valgrind).is_none() {
+        eprintln!("left out: valgrind is not installed");
+    }
+}
