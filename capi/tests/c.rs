@@ -1,4 +1,4 @@
-//! Programs in C against the library: compiled by the system's compilers, and watched by valgrind if it is
+//! Programs in C and C++ against the library: compiled by the system's compilers, and watched by valgrind if it is
 //! there.
 #![forbid(unsafe_code)]
 
@@ -20,7 +20,8 @@ fn library_folder() -> PathBuf {
 /// Compiles a program, and runs it by a command in front of it.
 fn run(source: &str, compiler: &[&str], before: &[&str]) -> Option<Output> {
     let folder = library_folder();
-    let program = folder.join(format!("capi-{}", source.replace(['/', '.'], "-")));
+    let name = format!("capi-{}-{}", source.replace(['/', '.'], "-"), compiler.len() + before.len());
+    let program = folder.join(name);
     let (name, flags) = compiler.split_first().expect("there is a compiler");
     let compiled = Command::new(name)
         .args(flags)
@@ -49,9 +50,14 @@ fn run(source: &str, compiler: &[&str], before: &[&str]) -> Option<Output> {
 /// Flags of C, and that builds with debug assertions refuse what was freed before.
 const C: [&str; 4] = ["cc", "-std=c11", "-D_GNU_SOURCE", "-DESL_CHECKS_FREED"];
 
-/// Runs a program that ends with status 0, and returns its output.
-fn output(source: &str, before: &[&str]) -> Option<String> {
-    let run = run(source, &C, before)?;
+const CPP: [&str; 2] = ["c++", "-std=c++17"];
+
+/// Has the compiler watch for uses of memory that have no meaning.
+const SANITIZED: [&str; 4] = ["c++", "-std=c++17", "-fsanitize=address,undefined", "-fno-sanitize-recover"];
+
+/// Runs a program that ends with status 0, and returns its output; `None` without the tools for it.
+fn output(source: &str, compiler: &[&str], before: &[&str]) -> Option<String> {
+    let run = run(source, compiler, before)?;
     let text = String::from_utf8_lossy(&run.stdout).into_owned();
     assert!(run.status.success(), "{text}\n{}", String::from_utf8_lossy(&run.stderr));
     Some(text)
@@ -75,15 +81,37 @@ fn the_header_is_that_of_the_sources() {
 
 #[test]
 fn the_example_ends_its_mission() {
-    let text = output("examples/rover.c", &[]).expect("there is a C compiler");
+    let text = output("examples/rover.c", &C, &[]).expect("there is a C compiler");
     let expected = "obstacle after 4 m, once more\ndrove 10 m\ndrove 20 m\ndrove 30 m\n\
                     the mission ended with :ALL-LEGS\n";
     assert_eq!(text, expected);
 }
 
 #[test]
-fn the_api_keeps_its_promises() {
-    assert_eq!(output("tests/api.c", &[]).as_deref(), Some("0 faults\n"));
+fn the_programs_of_the_manual_run() {
+    let chapter = std::fs::read_to_string(root().join("../docs/manual/c.md")).expect("it can be read");
+    let c = [&C[..], &["-Wno-unused-parameter"]].concat();
+    for (language, compiler, expected) in
+        [("c", &c[..], "(3 4 5)\n"), ("cpp", &CPP, "(3 4 5)\n:OBSTACLE after 7 m\n")]
+    {
+        let program =
+            chapter.split(&format!("```{language}\n")).nth(1).and_then(|rest| rest.split("```").next());
+        let file = library_folder().join(format!("capi-manual.{language}"));
+        std::fs::write(&file, program.expect("the chapter has a program")).expect("it can be written");
+        let file = file.to_str().expect("it is text");
+        assert_eq!(output(file, compiler, &[]).as_deref(), Some(expected), "{language}");
+    }
+}
+
+#[test]
+fn c_gets_what_the_header_promises() {
+    assert_eq!(output("tests/api.c", &C, &[]).as_deref(), Some("0 faults\n"));
+}
+
+#[test]
+fn cpp_gets_what_the_header_promises() {
+    assert_eq!(output("tests/api.cpp", &CPP, &[]).as_deref(), Some("0 faults\n"));
+    assert_eq!(output("tests/api.cpp", &SANITIZED, &[]).as_deref(), Some("0 faults\n"));
 }
 
 #[test]
@@ -96,7 +124,9 @@ fn nothing_is_read_after_its_end_or_lost() {
         "--errors-for-leak-kinds=definite",
         "--error-exitcode=9",
     ];
-    if output("tests/api.c", &valgrind).is_none() {
-        eprintln!("left out: valgrind is not installed");
+    for (source, compiler) in [("tests/api.c", &C[..]), ("tests/api.cpp", &CPP)] {
+        if output(source, compiler, &valgrind).is_none() {
+            eprintln!("left out: valgrind is not installed");
+        }
     }
 }

@@ -1,0 +1,104 @@
+// What the C++ API promises: each check prints its line if it does not hold.
+#include "esl.hpp"
+
+#include <iostream>
+#include <thread>
+
+static int faults = 0;
+
+#define CHECK(condition)                                                            \
+    do {                                                                            \
+        if (!(condition)) {                                                         \
+            std::cout << "line " << __LINE__ << ": " << #condition << std::endl;    \
+            faults++;                                                               \
+        }                                                                           \
+    } while (0)
+
+template <typename F>
+static std::string cause_of(F function) {
+    try {
+        function();
+    } catch (const esl::failure &thrown) {
+        return thrown.cause();
+    }
+    return "nothing";
+}
+
+static void values() {
+    CHECK(esl::value(42).as<int>() == 42);
+    CHECK(!esl::value(300).try_as<std::uint8_t>() && !esl::value(-1).try_as<unsigned>());
+    CHECK(esl::value(std::uint64_t(-1)).print() == "18446744073709551615");
+    CHECK(esl::value("ridge").as<std::string>() == "ridge");
+    CHECK(esl::value(std::string("a\0b", 3)).as<std::string>().size() == 3);
+    CHECK(esl::value(std::vector<float>{0.5f, 2.0f}).as<std::vector<double>>()[1] == 2.0);
+    CHECK(!esl::value(std::vector<double>{0.5}).try_as<std::vector<int>>());
+    CHECK(esl::value(std::vector<std::string>{"a", "b"}).print() == "(\"a\" \"b\")");
+    CHECK(esl::value(std::optional<int>()).print() == "NIL");
+    CHECK(esl::value::read("(:robot rover)").find("robot")->text() == "ROVER");
+    CHECK(cause_of([] { esl::value::read("(1"); }) == ":COMPILATION-FAILED");
+    CHECK(cause_of([] { esl::value(1.5).as<int>(); }) == ":TYPE-ERROR");
+}
+
+static void functions() {
+    esl::engine engine;
+    engine.define("area", "(width &optional height)", "An area.",
+                  [](double width, std::optional<double> height) { return width * height.value_or(width); });
+    CHECK(engine.eval("(list (area 3) (area 3 4))").print() == "(9.0 12.0)");
+    CHECK(cause_of([&] { engine.eval("(area :wide)"); }) == ":TYPE-ERROR");
+    engine.define("stick", "()", "Fails.", []() -> int { throw esl::failure("valve-stuck", {3, "left"}); });
+    CHECK(engine.eval("(handler-case (stick) (failure (f) (failure-arguments f)))").print() == "(3 \"left\")");
+    engine.define("loosen", "()", "Fails.", []() { throw std::runtime_error("a bolt is loose"); });
+    try {
+        engine.eval("(loosen)");
+        CHECK(false);
+    } catch (const esl::failure &thrown) {
+        CHECK(std::string(thrown.what()).find("a bolt is loose") != std::string::npos);
+        CHECK(!thrown.frames().empty() && thrown.report().size() > 10);
+    }
+}
+
+static void operations() {
+    esl::engine engine;
+    engine.define_operation("drive", "(metres)", "Drives.", [](esl::operation work) {
+        std::thread([work = std::move(work)]() mutable {
+            double metres = work.argument<double>(0);
+            if (metres > 10) return work.fail(esl::failure("obstacle", {7}));
+            work.complete(metres);
+        }).detach();
+    });
+    engine.define_operation("lose", "()", "Is dropped.", [](esl::operation) {});
+    CHECK(engine.eval("(drive 3)").as<double>() == 3.0);
+    CHECK(cause_of([&] { engine.eval("(drive 50)"); }) == ":OBSTACLE");
+    CHECK(cause_of([&] { engine.eval("(lose)"); }) == ":OPERATION-DROPPED");
+}
+
+static void threads() {
+    esl::engine engine(esl::settings{});
+    engine.eval("(progn (define-input commands :capacity 9) (defun double (n) (* 2 n)))");
+    esl::handle handle = engine.handle();
+    std::thread operator_thread([handle]() mutable {
+        int doubled = handle.call("double", {21}).wait().as<int>();
+        handle.assert_fact(esl::value::read("(at rover ridge)")).wait();
+        esl::value places = handle.query(esl::value::read("(at ?robot ?place)")).wait();
+        CHECK(places[0].find("place")->text() == "RIDGE");
+        handle.signal("commands", {doubled});
+    });
+    CHECK(engine.eval("(wait-for-event commands)").as<int>() == 42);
+    operator_thread.join();
+    CHECK(cause_of([&] { handle.signal("no-such-input"); }) == ":INVALID-ARGUMENT");
+    esl::reply answer = engine.begin("(list 1)");
+    CHECK(!answer.take());
+    while (engine.poll(1000).state == ESL_RUNNING) {
+    }
+    CHECK(answer.take()->print() == "(1)");
+}
+
+int main() {
+    values();
+    functions();
+    operations();
+    threads();
+    CHECK(cause_of([] { esl::settings s; s.allow = {"fly"}; esl::engine engine(s); }) == ":INVALID-ARGUMENT");
+    std::cout << faults << " faults" << std::endl;
+    return faults != 0;
+}
