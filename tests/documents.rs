@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Folders of documents; `docs` and `examples` with all that is below them.
-const FOLDERS: [&str; 23] = [
+const FOLDERS: [&str; 24] = [
     "",
     "benches",
     "bytecode",
@@ -29,6 +29,7 @@ const FOLDERS: [&str; 23] = [
     "syntax",
     "testing",
     "timeline",
+    "trees",
     "vm",
     "world",
 ];

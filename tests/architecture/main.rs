@@ -27,7 +27,7 @@ const SECTIONS: [(&str, &str); 12] = [
 ];
 
 /// Folders of the packages that the table of tools lists as a whole.
-const TOOLS: [&str; 10] = [
+const TOOLS: [&str; 11] = [
     "commands/eslc",
     "commands/eslvm",
     "commands/shared",
@@ -38,6 +38,7 @@ const TOOLS: [&str; 10] = [
     "syntax",
     "testing",
     "timeline",
+    "trees",
 ];
 
 /// Returns the folders of the sources of all packages in the code map.
@@ -130,7 +131,7 @@ fn the_readmes_of_the_libraries_list_their_files() {
         let files = names_of_rows(section(&text, heading));
         assert_eq!(files, loaded, "stdlib/README.md and stdlib/{folder}load-order");
     }
-    for name in ["world", "robots"] {
+    for name in ["world", "robots", "trees"] {
         let there = modules(&root().join(name).join("modules"));
         let names: BTreeSet<String> = there.iter().map(|name| format!(":{name}")).collect();
         assert_eq!(
@@ -270,7 +271,8 @@ fn words_of_comment<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
 
 #[test]
 fn comments_name_the_thing() {
-    let programs = ["stdlib", "world/modules", "robots/modules"].map(|folder| root().join(folder));
+    let programs =
+        ["stdlib", "world/modules", "robots/modules", "trees/modules"].map(|folder| root().join(folder));
     let mut found = Vec::new();
     for path in files_below(root().to_path_buf()) {
         let mark = match path.extension().and_then(|extension| extension.to_str()) {
@@ -442,7 +444,7 @@ fn paths_in_code(text: &str) -> Vec<&str> {
 fn each_file_that_a_document_names_exists() {
     // Paths in `docs/mechanisms.md` are relative to the machine or the library.
     let bases = ["", "vm/src", "stdlib"];
-    let crates = CRATES_WITH_TABLES.iter().chain(&["stdlib", "world", "robots"]);
+    let crates = CRATES_WITH_TABLES.iter().chain(&["stdlib", "world", "robots", "trees"]);
     let readmes = crates.map(|name| format!("{name}/README.md"));
     let documents =
         ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md", "docs/glossary.md", "docs/mechanisms.md"];

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod format;
+mod import;
 mod new;
 mod warnings;
 
@@ -19,6 +20,7 @@ use esl_compiler::diagnostic::{Format, Renderer};
 use esl_language_server::ClientExit;
 
 use format::{FormatOptions, format_files};
+use import::{ImportOptions, import_tree};
 use warnings::WarningOptions;
 
 /// The compiler of ESL, the Execution Support Language.
@@ -149,6 +151,14 @@ enum EslcAction {
         #[command(flatten)]
         modules: LibraryFolders,
     },
+    /// Write a program for a behaviour tree
+    ///
+    /// Reads the XML of BehaviorTree.CPP, formats 3 and 4, and the files that it includes. Exit status: 0 the
+    /// program is written; 2 wrong usage, or a file that cannot be read; 3 there are faults in the tree.
+    Import {
+        #[command(flatten)]
+        options: ImportOptions,
+    },
     /// Start the language server, which editors talk to over standard input and output
     Lsp {
         /// Ignored; some editors pass it to name the transport
@@ -175,6 +185,7 @@ enum EslcAction {
 const HABITS: command::Habits = &[
     ("indent", "eslc format"),
     ("lint", "eslc check"),
+    ("convert", "eslc import"),
     ("clippy", "eslc check"),
     ("build", "eslc compile"),
     ("init", "eslc new"),
@@ -199,6 +210,7 @@ fn main() -> ExitCode {
         EslcAction::Check { files, compiling } => check(&files, &compiling),
         EslcAction::Disasm { file, compiling } => disassemble(&file, &compiling),
         EslcAction::Format { options, modules } => Ok(format_files(&options, &modules.library)),
+        EslcAction::Import { options } => Ok(import_tree(&options)),
         EslcAction::New { name } => Ok(new::new_project(&name)),
         EslcAction::Lsp { modules, .. } => serve_editor(modules.library),
         EslcAction::Completions { shell } => Ok(command::print_completions(shell, Eslc::command())),

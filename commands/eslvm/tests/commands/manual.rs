@@ -16,6 +16,7 @@ mod chapters {
     test_files! { super::check, "docs/manual", "md":
         readme = "README.md",
         base_language = "base-language.md",
+        behaviour_trees_import = "behaviour-trees-import.md",
         c = "c.md",
         coordination = "coordination.md",
         database = "database.md",
