@@ -1,12 +1,15 @@
-//! Modules for ESL programs that talk to robots: Zenoh, and nodes and messages of ROS 2.
+//! Modules for ESL programs that talk to robots: Zenoh, nodes and messages of ROS 2, and
+//! files of MCAP.
 //!
 //! ```
 //! esl_world::add_modules(esl_robots::MODULES);
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod mcap;
 pub mod message;
 mod ros;
+pub mod run;
 mod zenoh;
 
 use esl_host::{HostModule, HostRows, Inbox};
@@ -18,8 +21,10 @@ fn none(inbox: &Inbox) -> HostRows {
 
 /// The modules. Those whose names begin with `ros-` are parts of `ros`, which requires them.
 pub const MODULES: &[HostModule] = &[
+    HostModule { name: "mcap", text: include_str!("../modules/mcap.esl"), rows: self::mcap::rows },
     HostModule { name: "ros", text: include_str!("../modules/ros.esl"), rows: ros::rows },
     HostModule { name: "ros-actions", text: include_str!("../modules/ros-actions.esl"), rows: none },
+    HostModule { name: "ros-bags", text: include_str!("../modules/ros-bags.esl"), rows: none },
     HostModule { name: "ros-graph", text: include_str!("../modules/ros-graph.esl"), rows: none },
     HostModule { name: "ros-node", text: include_str!("../modules/ros-node.esl"), rows: none },
     HostModule { name: "ros-worlds", text: include_str!("../modules/ros-worlds.esl"), rows: none },

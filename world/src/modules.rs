@@ -40,7 +40,7 @@ const OF_THE_LIBRARY: &[fn(&Inbox) -> HostRows] = &[
 static ADDED: RwLock<Vec<&'static HostModule>> = RwLock::new(Vec::new());
 
 /// Modules of crates that a program may lack, and the feature of the commands that adds them.
-const OPTIONAL: &[(&str, &str)] = &[("ros", "robots"), ("zenoh", "robots")];
+const OPTIONAL: &[(&str, &str)] = &[("mcap", "robots"), ("ros", "robots"), ("zenoh", "robots")];
 
 /// Adds modules of other crates for all machines that this process makes from now on, and for its
 /// compilations. A module in place of an earlier one of its name wins.

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod explore;
+pub mod mcap;
 pub mod operate;
 pub mod profile;
 pub mod repl;

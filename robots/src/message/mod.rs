@@ -14,6 +14,7 @@ mod complete;
 mod definition;
 mod describe;
 mod fault;
+mod joined;
 mod message_type;
 #[doc(hidden)]
 pub mod noise;

@@ -114,6 +114,14 @@ fn add_types(rows: &mut HostRows, types: &Types) {
         },
     )
     .everywhere();
+    let known = types.clone();
+    rows.at_once(
+        "%ROS-JOINED-TEXT",
+        ["type"],
+        "Returns the text of the definition of TYPE, and of the types that it names.",
+        move |name: String| Ok(known.joined_text(&name)?),
+    )
+    .everywhere();
     rows.at_once("%ROS-UUID", [], "Returns the bytes of a new name of a goal.", || {
         let mut bytes = vec![0; UUID];
         getrandom::fill(&mut bytes).map_err(|error| HostFailure::new("ROS-ERROR", error))?;

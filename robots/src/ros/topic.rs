@@ -17,6 +17,7 @@ use super::graph::GraphEvent;
 use super::node::{Endpoint, RosNode, Topic, tell};
 use super::wire::{EndpointKind, QosProfile};
 use crate::message::{MessageType, decode, encode};
+use crate::run::note_topic;
 use crate::zenoh::delivery::InputDelivery;
 use crate::zenoh::entity::DeclaredEntity;
 use crate::zenoh::runtime::in_background;
@@ -40,6 +41,7 @@ struct DeclaredPublisher {
 /// A publisher of the program's.
 pub(super) struct TopicPublisher {
     declared: Mutex<Option<Arc<DeclaredPublisher>>>,
+    name: String,
     of_type: Arc<MessageType>,
     sent: AtomicI64,
     requests: Requests,
@@ -66,7 +68,7 @@ pub(super) async fn advertise(
     of_type: Arc<MessageType>,
     qos: QosProfile,
 ) -> Result<TopicPublisher, HostFailure> {
-    let mut endpoint = node.endpoint(EndpointKind::Publisher, topic(name, &of_type), qos);
+    let mut endpoint = node.endpoint(EndpointKind::Publisher, topic(name.clone(), &of_type), qos);
     let key = endpoint.key.clone();
     let declare = move |session: &zenoh::Session| {
         let is_reliable = qos.is_reliable;
@@ -87,6 +89,7 @@ pub(super) async fn advertise(
     endpoint.announce(node.session()).await?;
     Ok(TopicPublisher {
         declared: Mutex::new(Some(Arc::new(DeclaredPublisher { publisher, endpoint }))),
+        name,
         of_type,
         sent: AtomicI64::new(0),
         requests: node.session().requests().clone(),
@@ -105,6 +108,7 @@ impl TopicPublisher {
         let declared =
             declared.ok_or_else(|| HostFailure::new("PUBLISHER-CLOSED", "the publisher is closed"))?;
         let payload = encode(&self.of_type, message)?;
+        note_topic(&self.name, &self.of_type, &payload);
         let number = self.sent.fetch_add(1, Ordering::Relaxed) + 1;
         let attachment = MessageAttachment::now(number, declared.endpoint.gid).encode();
         let send = move || {
@@ -176,16 +180,19 @@ pub(super) async fn subscribe(
     let mut endpoint = node.endpoint(EndpointKind::Subscription, topic(name.clone(), &of_type), qos);
     let delivery = InputDelivery::begin(input)?;
     let delivering = delivery.clone();
-    let malformed = Malformed::new(node.events().clone(), name);
+    let malformed = Malformed::new(node.events().clone(), name.clone());
     let deliver = move |sample: Sample| {
         let payload = sample.payload().to_bytes();
         let attachment = sample.attachment();
         let attachment = attachment.and_then(|bytes| MessageAttachment::decode(&bytes.to_bytes()));
         match decode(&of_type, &payload) {
-            Ok(message) => delivering.put(payload.len(), || {
-                let time = attachment.map(|attachment| attachment.time as f64 / 1e9);
-                vec![message, time.into_datum()]
-            }),
+            Ok(message) => {
+                note_topic(&name, &of_type, &payload);
+                delivering.put(payload.len(), || {
+                    let time = attachment.map(|attachment| attachment.time as f64 / 1e9);
+                    vec![message, time.into_datum()]
+                });
+            }
             Err(fault) => malformed.note(attachment.map(|attachment| attachment.gid), &fault.to_string()),
         }
     };

@@ -27,6 +27,8 @@ mod lines;
 #[cfg(target_os = "linux")]
 mod manipulator;
 mod manual;
+#[cfg(unix)]
+mod mcap;
 mod memory;
 mod missions;
 mod modules;

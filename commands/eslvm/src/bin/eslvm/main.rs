@@ -69,6 +69,7 @@ fn main() -> ExitCode {
             coverage,
             schedule,
             record,
+            mcap,
             mut trace,
             full,
             operate,
@@ -94,6 +95,7 @@ fn main() -> ExitCode {
                     profile_unit,
                     coverage: coverage.as_deref(),
                     record: record.as_deref(),
+                    mcap: mcap.as_deref(),
                     trace: &trace,
                     operate: &operate,
                     is_quiet,
@@ -151,6 +153,7 @@ fn main() -> ExitCode {
             let attach = |rights| eslvm::repl::attach(&address, security, secret_file.as_deref(), &rights);
             rights.rights().and_then(attach)
         }
+        EslvmAction::Mcap { action } => eslvm::mcap::run(&action),
         EslvmAction::Repl { options, modules } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &modules.library);
             eslvm::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)

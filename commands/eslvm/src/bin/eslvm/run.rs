@@ -10,6 +10,7 @@ use esl_command::{USAGE, complain, refuse_overwriting};
 use esl_replay::{FileRecorder, RunSetup};
 use esl_timeline::Timeline;
 use esl_vm::vm::Tier;
+use eslvm::mcap::McapRecording;
 use eslvm::operate::OperateOptions;
 use eslvm::profile::{INTERVAL, Profile, ProfileUnit};
 use eslvm::signal::{SignalTarget, end_on_signal};
@@ -24,6 +25,7 @@ pub(crate) struct RunReports<'a> {
     pub(crate) tier: Option<TierChoice>,
     pub(crate) timeline: Option<&'a Path>,
     pub(crate) record: Option<&'a Path>,
+    pub(crate) mcap: Option<&'a Path>,
     pub(crate) profile: Option<&'a Path>,
     pub(crate) profile_unit: ProfileUnit,
     pub(crate) coverage: Option<&'a Path>,
@@ -52,11 +54,12 @@ pub(crate) fn run(
         profile_unit,
         coverage,
         record,
+        mcap,
         trace,
         operate,
         is_quiet,
     } = *reports;
-    for output in [timeline, profile, coverage, record].into_iter().flatten() {
+    for output in [timeline, profile, coverage, record, mcap].into_iter().flatten() {
         refuse_overwriting(output, [file])?;
     }
     let signals = SignalTarget::default();
@@ -77,9 +80,14 @@ pub(crate) fn run(
         Some(path) => Some((FileRecorder::create(path).map_err(|error| not_written(path, &error))?, path)),
         None => None,
     };
-    let host: Box<dyn Host + Send> = match &recording {
-        Some((recorder, _)) => Box::new(RecordingHost::with_recorder(host, recorder.clone())),
-        None => Box::new(host),
+    let mcap = match mcap {
+        Some(path) => Some((McapRecording::begin(path, &mut host)?, path)),
+        None => None,
+    };
+    let recorder = recording.as_ref().map(|(recorder, _)| recorder);
+    let host: Box<dyn Host + Send> = match &mcap {
+        Some((mcap, _)) => recorded(mcap.host(host), recorder),
+        None => recorded(host, recorder),
     };
     let mut machine = program::machine(options.config(), host).map_err(setup)?;
     operate.prepare(&mut machine)?;
@@ -98,6 +106,9 @@ pub(crate) fn run(
         }
         None => None,
     };
+    if let Some((mcap, _)) = &mcap {
+        mcap.watch(&mut machine);
+    }
     if is_covered {
         machine.count_passages();
     }
@@ -154,6 +165,11 @@ pub(crate) fn run(
     {
         status = not_written(path, &error);
     }
+    if let Some((mcap, path)) = mcap
+        && let Err(error) = mcap.end(&mut machine)
+    {
+        status = not_written(path, &error);
+    }
     if let (Some(path), Some(found)) = (profile, &found)
         && let Err(error) = found.write(path, profile_unit)
     {
@@ -191,6 +207,14 @@ pub(crate) fn run(
     // The process ends here: giving the memory back piece by piece would only take time.
     std::mem::forget(machine);
     Ok(status)
+}
+
+/// Returns a host whose answers are recorded, if there is a recorder.
+fn recorded(host: impl Host + Send + 'static, recorder: Option<&FileRecorder>) -> Box<dyn Host + Send> {
+    match recorder {
+        Some(recorder) => Box::new(RecordingHost::with_recorder(host, recorder.clone())),
+        None => Box::new(host),
+    }
 }
 
 /// Refuses a schedule that was not found in this program, or not by this machine.

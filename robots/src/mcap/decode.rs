@@ -1,0 +1,75 @@
+//! The payload of a message as data, by the schema in its file.
+
+use std::sync::Arc;
+
+use esl_bytecode::datum::Datum;
+use esl_host::IntoDatum;
+
+use super::index::{McapChannel, McapSchema};
+use crate::message::{MessageType, Types, decode};
+
+/// The form in which a program gets the payloads of a channel.
+#[derive(Clone, Debug)]
+pub enum PayloadForm {
+    /// Messages of ROS 2, in CDR.
+    Ros(Arc<MessageType>),
+    /// JSON, which the program parses.
+    Json,
+    /// Anything else: bytes.
+    Bytes,
+    /// The schema is wrong, for this reason.
+    Invalid(String),
+}
+
+/// A payload as data, with the name of its form: `:MESSAGE`, `:JSON`, `:BYTES`, or `:FAULT` and the reason.
+pub(super) struct DecodedPayload {
+    pub(super) form: &'static str,
+    pub(super) data: Datum,
+}
+
+impl PayloadForm {
+    /// Returns the form of a channel's payloads.
+    pub fn of(channel: &McapChannel) -> PayloadForm {
+        match (channel.encoding.as_str(), &channel.schema) {
+            ("cdr", Some(schema)) if schema.encoding == "ros2msg" => match message_type(schema) {
+                Ok(found) => PayloadForm::Ros(found),
+                Err(reason) => PayloadForm::Invalid(format!("the schema of {}: {reason}", channel.topic)),
+            },
+            ("json", _) => PayloadForm::Json,
+            _ => PayloadForm::Bytes,
+        }
+    }
+
+    /// Returns a payload as data.
+    pub(super) fn decode(&self, topic: &str, payload: &esl_bytecode::Bytes) -> DecodedPayload {
+        let fault = |reason: String| DecodedPayload { form: "FAULT", data: reason.into_datum() };
+        match self {
+            PayloadForm::Bytes => {
+                // A part would keep the whole chunk.
+                let data = esl_bytecode::Bytes::copy_from_slice(payload).into_datum();
+                DecodedPayload { form: "BYTES", data }
+            }
+            PayloadForm::Json => match std::str::from_utf8(payload) {
+                Ok(text) => DecodedPayload { form: "JSON", data: text.into_datum() },
+                Err(_) => fault(format!("{topic}: the message is not text")),
+            },
+            PayloadForm::Ros(of_type) => match decode(of_type, payload) {
+                Ok(data) => DecodedPayload { form: "MESSAGE", data },
+                Err(reason) => fault(format!("{topic}: {reason}")),
+            },
+            PayloadForm::Invalid(reason) => fault(reason.clone()),
+        }
+    }
+}
+
+/// Returns the type that a schema of ROS 2 describes: by its own text, whose types come before those that
+/// come with ESL.
+///
+/// # Errors
+/// What is wrong with it.
+pub(super) fn message_type(schema: &McapSchema) -> Result<Arc<MessageType>, String> {
+    let text = std::str::from_utf8(&schema.data).map_err(|_| "it is not text".to_owned())?;
+    let types = Types::bundled();
+    types.define(&schema.name, text).map_err(|fault| fault.to_string())?;
+    types.message(&schema.name).map_err(|fault| fault.to_string())
+}

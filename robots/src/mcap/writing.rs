@@ -1,0 +1,122 @@
+//! Writing by a program: files, and the channels that it has opened in them.
+
+use std::fs::OpenOptions;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use esl_bytecode::Bytes;
+use esl_bytecode::datum::Datum;
+use esl_host::{FromArgument, HostFailure, HostObject, Payload};
+use mcap::Compression;
+
+use super::output::{McapOutput, OutputChannel, OutputOptions};
+use super::reading::failure;
+use crate::message::{MessageType, Types, encode};
+
+/// A file that a program writes.
+pub(super) struct McapWriter {
+    pub(super) output: McapOutput,
+    /// The types of the channels of ROS 2, by their numbers.
+    types: Mutex<Vec<(u16, Arc<MessageType>)>>,
+}
+
+impl HostObject for McapWriter {
+    const KIND: &'static str = "MCAP-OUTPUT";
+}
+
+/// Returns the settings of these names.
+pub(super) fn options(
+    compression: Option<&str>,
+    chunk_size: Option<u64>,
+    profile: String,
+) -> Result<OutputOptions, HostFailure> {
+    let compression = match compression {
+        None => None,
+        Some("ZSTD") => Some(Compression::Zstd),
+        Some("LZ4") => Some(Compression::Lz4),
+        Some(other) => {
+            let known = "expected :zstd, :lz4 or nil";
+            return Err(failure(format!("unknown compression `:{}`: {known}", other.to_lowercase())));
+        }
+    };
+    Ok(OutputOptions { compression, chunk_size, profile })
+}
+
+impl McapWriter {
+    /// Creates the file at a path, in place of another one.
+    pub(super) fn create(path: &str, options: &OutputOptions) -> Result<McapWriter, HostFailure> {
+        let begin = || {
+            let file = OpenOptions::new().write(true).create(true).truncate(true).open(path)?;
+            McapOutput::begin(file, options)
+        };
+        let output = begin().map_err(|error: std::io::Error| failure(format!("{path}: {error}")))?;
+        Ok(McapWriter { output, types: Mutex::default() })
+    }
+
+    /// Begins a file whose bytes the program takes.
+    pub(super) fn in_memory(options: &OutputOptions) -> Result<McapWriter, HostFailure> {
+        let output = McapOutput::in_memory(options).map_err(failure)?;
+        Ok(McapWriter { output, types: Mutex::default() })
+    }
+
+    fn types(&self) -> MutexGuard<'_, Vec<(u16, Arc<MessageType>)>> {
+        // The list is whole at every moment, so a panic elsewhere does not corrupt it.
+        self.types.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Opens a channel of messages of ROS 2, whose type `text` defines, or else one that comes with ESL.
+    pub(super) fn ros_channel(
+        &self,
+        topic: String,
+        name: &str,
+        text: Option<String>,
+        metadata: Vec<(String, String)>,
+    ) -> Result<u16, HostFailure> {
+        let types = Types::bundled();
+        if let Some(text) = &text {
+            types.define(name, text)?;
+        }
+        let of_type = types.message(name)?;
+        let channel = ros_channel(topic, &types, &of_type, metadata)?;
+        let number = self.output.channel(channel).map_err(failure)?;
+        self.types().push((number, of_type));
+        Ok(number)
+    }
+
+    /// Opens a channel of other messages.
+    pub(super) fn channel(&self, channel: OutputChannel) -> Result<u16, HostFailure> {
+        self.output.channel(channel).map_err(failure)
+    }
+
+    /// Writes a message. Returns whether there is room for more.
+    pub(super) fn write(
+        &self,
+        channel: u16,
+        times: (u64, u64),
+        sequence: Option<u32>,
+        message: &Datum,
+    ) -> Result<bool, HostFailure> {
+        if let Some(reason) = self.output.fault() {
+            return Err(failure(reason));
+        }
+        let of_type =
+            self.types().iter().find(|(known, _)| *known == channel).map(|(_, found)| found.clone());
+        let payload = match of_type {
+            Some(of_type) => Bytes::from(encode(&of_type, message)?),
+            None => Payload::from_argument(message)?.0,
+        };
+        Ok(self.output.write(channel, times, sequence, payload))
+    }
+}
+
+/// Returns a channel of messages of ROS 2, as rosbag2 describes them.
+pub(super) fn ros_channel(
+    topic: String,
+    types: &Types,
+    of_type: &MessageType,
+    mut metadata: Vec<(String, String)>,
+) -> Result<OutputChannel, HostFailure> {
+    let text = types.joined_text(of_type.name())?;
+    metadata.push(("topic_type_hash".into(), of_type.hash().to_owned()));
+    let schema = Some((of_type.name().to_owned(), "ros2msg".into(), Bytes::from(text)));
+    Ok(OutputChannel { topic, encoding: "cdr".into(), schema, metadata })
+}

@@ -1,0 +1,168 @@
+//! A host that tells a recorder what comes from outside, which operations begin, and what is printed.
+
+use esl_bytecode::datum::Datum;
+use esl_host::{
+    Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, HostState, Inbox, Incoming, Input,
+    Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
+};
+
+use super::recorder::RunRecorder;
+
+/// A host whose requests a recorder hears.
+pub struct ObservedHost<H> {
+    host: H,
+    recorder: RunRecorder,
+    /// The monotonic clock at the beginning.
+    start: u64,
+}
+
+impl<H: Host> ObservedHost<H> {
+    /// Tells `recorder` of the requests to `host`.
+    pub fn new(mut host: H, recorder: RunRecorder) -> ObservedHost<H> {
+        let start = host.monotonic();
+        ObservedHost { host, recorder, start }
+    }
+
+    /// Notes the time.
+    fn note_time(&mut self) {
+        let since = self.host.monotonic().saturating_sub(self.start);
+        self.recorder.note_time(since);
+    }
+}
+
+impl<H: Host> Host for ObservedHost<H> {
+    fn monotonic(&mut self) -> u64 {
+        self.host.monotonic()
+    }
+
+    fn wall_clock(&mut self) -> i64 {
+        self.host.wall_clock()
+    }
+
+    fn processor_time(&mut self) -> u64 {
+        self.host.processor_time()
+    }
+
+    fn due(&mut self, deadline: u64) -> Option<u64> {
+        self.host.due(deadline)
+    }
+
+    fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        self.host.wait(deadline, awaited)
+    }
+
+    fn save(&self) -> Option<HostState> {
+        self.host.save()
+    }
+
+    fn restore(&mut self, state: &HostState) -> bool {
+        self.host.restore(state)
+    }
+
+    fn stopwatch(&mut self) -> u64 {
+        self.host.stopwatch()
+    }
+
+    fn is_virtual(&self) -> bool {
+        self.host.is_virtual()
+    }
+
+    fn advance(&mut self, nanoseconds: u64) {
+        self.host.advance(nanoseconds);
+    }
+
+    fn seed(&mut self) -> u64 {
+        self.host.seed()
+    }
+
+    fn arguments(&mut self) -> Vec<String> {
+        self.host.arguments()
+    }
+
+    fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
+        self.note_time();
+        self.recorder.note_output(usize::from(output == Output::Error), bytes);
+        self.host.write(output, bytes)
+    }
+
+    fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
+        let written = self.host.write_ready(output, bytes);
+        if let Ok(count) = written {
+            self.note_time();
+            self.recorder.note_output(usize::from(output == Output::Error), &bytes[..count]);
+        }
+        written
+    }
+
+    fn read_input(&mut self) -> Input {
+        self.host.read_input()
+    }
+
+    fn is_interactive(&mut self) -> bool {
+        self.host.is_interactive()
+    }
+
+    fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {
+        self.host.permit(right, object, narrowed)
+    }
+
+    fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
+        self.host.read_file(path)
+    }
+
+    fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
+        self.host.write_file(path, bytes, mode)
+    }
+
+    fn file_exists(&mut self, path: &str) -> bool {
+        self.host.file_exists(path)
+    }
+
+    fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
+        self.host.delete_file(path)
+    }
+
+    fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
+        self.host.request_of_files(request)
+    }
+
+    fn call(
+        &mut self,
+        name: &str,
+        arguments: &[Datum],
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
+        self.host.call(name, arguments, function)
+    }
+
+    fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
+        self.note_time();
+        self.recorder.note_operation(name, arguments);
+        self.host.begin(name, arguments, function);
+    }
+
+    fn inbox(&self) -> Inbox {
+        self.host.inbox()
+    }
+
+    fn poll(&mut self, round: u64) -> Vec<Incoming> {
+        let arrivals = self.host.poll(round);
+        if !arrivals.is_empty() {
+            self.note_time();
+            self.recorder.note_arrivals(&arrivals);
+        }
+        arrivals
+    }
+
+    fn broken_output_status(&self) -> u8 {
+        self.host.broken_output_status()
+    }
+
+    fn hear_of_refusal(&mut self) {
+        self.host.hear_of_refusal();
+    }
+
+    fn check(&mut self, check: RunCheck) {
+        self.host.check(check);
+    }
+}
