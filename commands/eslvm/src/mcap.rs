@@ -1,16 +1,32 @@
-//! Runs as files of MCAP, `eslvm run --mcap`, and what is in such files, `eslvm mcap`.
+//! Runs as files of MCAP and as live sources of Foxglove, `eslvm run --mcap` and `--foxglove`, and what is in
+//! such files, `eslvm mcap`.
 //!
-//! Both belong to the feature `robots`; without it they are refused with what to type.
-#![allow(clippy::print_stdout, reason = "commands print")]
+//! All belong to the feature `robots`; without it they are refused with what to type.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
 
-use std::io;
-use std::path::Path;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
 
-use clap::Subcommand;
+use clap::{Args, Subcommand};
 use esl_command::{USAGE, complain};
+use esl_operate::parse_address;
 use esl_vm::vm::Vm;
 
-/// What is done with files of MCAP.
+/// Options by which a run is written for people and their tools.
+#[derive(Args, Clone, Debug, Default)]
+pub struct RunFileOptions {
+    /// Write the run to a file of MCAP, which Foxglove shows: tasks, failures, facts, inputs, operations,
+    /// output, and topics of ROS 2. Needs a build with the cargo feature `robots`
+    #[arg(long, value_name = "FILE")]
+    pub mcap: Option<PathBuf>,
+    /// Let Foxglove show the run while it goes on, the same as with --mcap, at a port of 127.0.0.1, by
+    /// default 8765, or at ADDRESS:PORT of this machine. Needs a build with the cargo feature `robots`
+    #[arg(long, value_name = "[ADDRESS:]PORT", num_args = 0..=1, require_equals = true, default_missing_value = "8765",
+          value_parser = parse_address)]
+    pub foxglove: Option<SocketAddr>,
+}
+
+/// Actions on files of MCAP.
 #[derive(Subcommand)]
 pub enum McapAction {
     /// Print the figures of a file: channels, messages, times, compression, and what is damaged
@@ -19,7 +35,7 @@ pub enum McapAction {
     Info {
         /// File, or the folder of a bag of ROS 2
         #[arg(value_name = "FILE")]
-        file: std::path::PathBuf,
+        file: PathBuf,
     },
 }
 
@@ -50,37 +66,67 @@ mod with_robots {
     use esl::host::Host;
     use esl_command::{FAILED, SUCCESS};
     use esl_robots::mcap::{McapBag, McapOutput, McapSelection, OutputOptions};
-    use esl_robots::run::{ObservedHost, RunRecorder};
+    use esl_robots::run::{LiveServer, ObservedHost, RunRecorder, RunSink, RunSinks};
 
-    use super::{Path, USAGE, Vm, complain, io};
+    use super::{Path, PathBuf, RunFileOptions, USAGE, Vm, complain};
 
     /// A host that a recorder hears.
     pub type McapHost<H> = ObservedHost<H>;
 
-    /// The recording of a run.
+    /// A run on its way to a file of MCAP, to Foxglove, or both.
     pub struct McapRecording {
-        output: Arc<McapOutput>,
+        output: Option<(Arc<McapOutput>, PathBuf)>,
+        live: Option<Arc<LiveServer>>,
         recorder: RunRecorder,
         /// Nothing for a run in virtual time.
         begun: Option<Instant>,
     }
 
     impl McapRecording {
-        /// Creates the file, for a run on this host.
+        /// Creates what was asked for, for a run of this program on this host; nothing if nothing was.
         ///
         /// # Errors
         /// The exit status, after a message.
-        pub fn begin(path: &Path, host: &mut impl Host) -> Result<McapRecording, u8> {
-            let options = OutputOptions { profile: "ros2".into(), ..OutputOptions::default() };
-            let output = File::create(path).and_then(|file| McapOutput::begin(file, &options));
-            let output = output.map(Arc::new).map_err(|error| {
-                complain(format_args!("{} cannot be written: {error}", path.display()));
-                USAGE
-            })?;
+        pub fn begin(
+            options: &RunFileOptions,
+            program: &str,
+            host: &mut impl Host,
+        ) -> Result<Option<McapRecording>, u8> {
+            let mut sinks: Vec<Arc<dyn RunSink>> = Vec::new();
+            let output = match &options.mcap {
+                None => None,
+                Some(path) => {
+                    let settings = OutputOptions { profile: "ros2".into(), ..OutputOptions::default() };
+                    let output = File::create(path).and_then(|file| McapOutput::begin(file, &settings));
+                    let output = output.map(Arc::new).map_err(|error| {
+                        complain(format_args!("{} cannot be written: {error}", path.display()));
+                        USAGE
+                    })?;
+                    sinks.push(output.clone());
+                    Some((output, path.clone()))
+                }
+            };
+            let live = match options.foxglove {
+                None => None,
+                Some(address) => {
+                    let live = LiveServer::begin(address, program).map(Arc::new).map_err(|fault| {
+                        complain(fault);
+                        USAGE
+                    })?;
+                    eprintln!("; Foxglove at ws://{}", live.address());
+                    sinks.push(live.clone());
+                    Some(live)
+                }
+            };
             let start = u64::try_from(host.wall_clock()).unwrap_or(0);
-            let recorder = RunRecorder::begin(output.clone(), start);
+            let sink: Arc<dyn RunSink> = match <[Arc<dyn RunSink>; 1]>::try_from(sinks) {
+                Ok([sink]) => sink,
+                Err(sinks) if sinks.is_empty() => return Ok(None),
+                Err(sinks) => Arc::new(RunSinks::new(sinks)),
+            };
+            let recorder = RunRecorder::begin(sink, start);
             let begun = (!host.is_virtual()).then(Instant::now);
-            Ok(McapRecording { output, recorder, begun })
+            Ok(Some(McapRecording { output, live, recorder, begun }))
         }
 
         /// Returns the host, whose requests are recorded.
@@ -96,15 +142,22 @@ mod with_robots {
             machine.add_observer(Box::new(self.recorder.clone()));
         }
 
-        /// Completes the file.
+        /// Completes the file, and ends the connections.
         ///
         /// # Errors
-        /// A part of it could not be written.
-        pub fn end(self, machine: &mut Vm) -> io::Result<()> {
+        /// The exit status, after a message: a part of the file could not be written.
+        pub fn end(self, machine: &mut Vm) -> Result<(), u8> {
             drop(machine.take_observers());
             self.recorder.end();
-            self.output.finish();
-            self.output.wait().map_err(io::Error::other)
+            if let Some(live) = self.live {
+                live.end();
+            }
+            let Some((output, path)) = self.output else { return Ok(()) };
+            output.finish();
+            output.wait().map_err(|reason| {
+                complain(format_args!("{} cannot be written: {reason}", path.display()));
+                USAGE
+            })
         }
     }
 
@@ -131,12 +184,12 @@ mod with_robots {
 
 #[cfg(not(feature = "robots"))]
 mod without_robots {
-    use super::{Path, USAGE, Vm, complain, io};
+    use super::{Path, RunFileOptions, USAGE, Vm, complain};
 
     /// The host itself.
     pub type McapHost<H> = H;
 
-    /// The recording of a run, which there is not without the feature.
+    /// A run on its way to a file, which there is not without the feature.
     pub enum McapRecording {}
 
     fn refuse(what: &str) -> u8 {
@@ -148,12 +201,20 @@ mod without_robots {
     }
 
     impl McapRecording {
-        /// Refuses.
+        /// Refuses what was asked for.
         ///
         /// # Errors
         /// The exit status, after a message.
-        pub fn begin(_path: &Path, _host: &mut impl esl::host::Host) -> Result<McapRecording, u8> {
-            Err(refuse("`--mcap`"))
+        pub fn begin(
+            options: &RunFileOptions,
+            _program: &str,
+            _host: &mut impl esl::host::Host,
+        ) -> Result<Option<McapRecording>, u8> {
+            match (&options.mcap, options.foxglove) {
+                (Some(_), _) => Err(refuse("`--mcap`")),
+                (None, Some(_)) => Err(refuse("`--foxglove`")),
+                (None, None) => Ok(None),
+            }
         }
 
         /// Returns the host.
@@ -168,7 +229,7 @@ mod without_robots {
         ///
         /// # Errors
         /// None.
-        pub fn end(self, _machine: &mut Vm) -> io::Result<()> {
+        pub fn end(self, _machine: &mut Vm) -> Result<(), u8> {
             match self {}
         }
     }

@@ -22,7 +22,7 @@ impl McapBag {
     /// Opens a file, or the folder of a bag of rosbag2.
     ///
     /// # Errors
-    /// What cannot be read at all, with the path of the file. Damaged parts are no error: [`McapBag::damage`]
+    /// A file cannot be read at all; the text names it. Damaged parts are no error: [`McapBag::damage`]
     /// returns them.
     pub fn open(path: &Path) -> Result<McapBag, McapFault> {
         let paths = if path.is_dir() { files_of_folder(path)? } else { vec![path.to_owned()] };
@@ -92,7 +92,7 @@ fn files_of_folder(folder: &Path) -> Result<Vec<PathBuf>, McapFault> {
             return Err(McapFault::Other(text));
         }
         Ok(_) => listed(&fs::read_to_string(&list)?)
-            .map_err(|reason| McapFault::Other(format!("{}: {reason}", list.display())))?,
+            .map_err(|fault| McapFault::Other(format!("{}: {fault}", list.display())))?,
         Err(_) => in_folder(folder)?,
     };
     if names.is_empty() {
@@ -124,18 +124,19 @@ fn in_folder(folder: &Path) -> Result<Vec<String>, McapFault> {
 }
 
 /// Returns the names under `relative_file_paths` in a `metadata.yaml`.
-fn listed(text: &str) -> Result<Vec<String>, String> {
+fn listed(text: &str) -> Result<Vec<String>, McapFault> {
     let value = |line: &str, key: &str| {
         let value = line.trim().strip_prefix(key)?.trim();
         Some(value.trim_matches(['"', '\'']).to_owned())
     };
     let storage = text.lines().find_map(|line| value(line, "storage_identifier:"));
     if let Some(storage) = storage.filter(|storage| storage != "mcap") {
-        return Err(format!("the bag is stored as `{storage}`: `ros2 bag convert` makes MCAP of it"));
+        let text = format!("the bag is stored as `{storage}`: `ros2 bag convert` makes MCAP of it");
+        return Err(McapFault::Other(text));
     }
     let mut lines = text.lines().skip_while(|line| line.trim() != "relative_file_paths:");
     if lines.next().is_none() {
-        return Err("expected `relative_file_paths:`".into());
+        return Err(McapFault::Other("expected `relative_file_paths:`".into()));
     }
     let names = lines.map_while(|line| value(line, "- "));
     Ok(names.filter(|name| !name.is_empty()).collect())
@@ -149,9 +150,9 @@ mod tests {
     fn the_files_of_a_bag_are_those_of_its_list() {
         let text = "rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n  \
                     relative_file_paths:\n    - a_0.mcap\n    - \"a_1.mcap\"\n  compression_format: \"\"\n";
-        assert_eq!(listed(text), Ok(vec!["a_0.mcap".into(), "a_1.mcap".into()]));
+        assert_eq!(listed(text).ok(), Some(vec!["a_0.mcap".into(), "a_1.mcap".into()]));
         let other = text.replace("mcap\n  relative", "sqlite3\n  relative");
-        assert!(listed(&other).is_err_and(|reason| reason.contains("`sqlite3`")));
+        assert!(listed(&other).is_err_and(|fault| fault.to_string().contains("`sqlite3`")));
         assert!(listed("version: 9").is_err());
     }
 }

@@ -6,11 +6,11 @@ use esl_bytecode::datum::Datum;
 use esl_host::IntoDatum;
 
 use super::index::{McapChannel, McapSchema};
-use crate::message::{MessageType, Types, decode};
+use crate::message::{MessageType, TypeFault, Types, decode};
 
 /// The form in which a program gets the payloads of a channel.
 #[derive(Clone, Debug)]
-pub enum PayloadForm {
+pub enum MessageForm {
     /// Messages of ROS 2, in CDR.
     Ros(Arc<MessageType>),
     /// JSON, which the program parses.
@@ -27,16 +27,16 @@ pub(super) struct DecodedPayload {
     pub(super) data: Datum,
 }
 
-impl PayloadForm {
+impl MessageForm {
     /// Returns the form of a channel's payloads.
-    pub fn of(channel: &McapChannel) -> PayloadForm {
+    pub fn of(channel: &McapChannel) -> MessageForm {
         match (channel.encoding.as_str(), &channel.schema) {
             ("cdr", Some(schema)) if schema.encoding == "ros2msg" => match message_type(schema) {
-                Ok(found) => PayloadForm::Ros(found),
-                Err(reason) => PayloadForm::Invalid(format!("the schema of {}: {reason}", channel.topic)),
+                Ok(found) => MessageForm::Ros(found),
+                Err(reason) => MessageForm::Invalid(format!("the schema of {}: {reason}", channel.topic)),
             },
-            ("json", _) => PayloadForm::Json,
-            _ => PayloadForm::Bytes,
+            ("json", _) => MessageForm::Json,
+            _ => MessageForm::Bytes,
         }
     }
 
@@ -44,32 +44,28 @@ impl PayloadForm {
     pub(super) fn decode(&self, topic: &str, payload: &esl_bytecode::Bytes) -> DecodedPayload {
         let fault = |reason: String| DecodedPayload { form: "FAULT", data: reason.into_datum() };
         match self {
-            PayloadForm::Bytes => {
+            MessageForm::Bytes => {
                 // A part would keep the whole chunk.
                 let data = esl_bytecode::Bytes::copy_from_slice(payload).into_datum();
                 DecodedPayload { form: "BYTES", data }
             }
-            PayloadForm::Json => match std::str::from_utf8(payload) {
+            MessageForm::Json => match std::str::from_utf8(payload) {
                 Ok(text) => DecodedPayload { form: "JSON", data: text.into_datum() },
                 Err(_) => fault(format!("{topic}: the message is not text")),
             },
-            PayloadForm::Ros(of_type) => match decode(of_type, payload) {
+            MessageForm::Ros(of_type) => match decode(of_type, payload) {
                 Ok(data) => DecodedPayload { form: "MESSAGE", data },
                 Err(reason) => fault(format!("{topic}: {reason}")),
             },
-            PayloadForm::Invalid(reason) => fault(reason.clone()),
+            MessageForm::Invalid(reason) => fault(reason.clone()),
         }
     }
 }
 
 /// Returns the type that a schema of ROS 2 describes: by its own text, whose types come before those that
 /// come with ESL.
-///
-/// # Errors
-/// What is wrong with it.
-pub(super) fn message_type(schema: &McapSchema) -> Result<Arc<MessageType>, String> {
-    let text = std::str::from_utf8(&schema.data).map_err(|_| "it is not text".to_owned())?;
+fn message_type(schema: &McapSchema) -> Result<Arc<MessageType>, TypeFault> {
     let types = Types::bundled();
-    types.define(&schema.name, text).map_err(|fault| fault.to_string())?;
-    types.message(&schema.name).map_err(|fault| fault.to_string())
+    types.define(&schema.name, &String::from_utf8_lossy(&schema.data))?;
+    types.message(&schema.name)
 }

@@ -10,8 +10,8 @@ use esl_bytecode::Bytes;
 use mcap::records::{MessageHeader, Record, op};
 
 use super::damage::{Damage, DamageKind};
-use super::index::{FileIndex, MAGIC, McapChannel, Section, of_summary};
-use super::record::{self, InnerRecords, MAX_SIZE, MESSAGE_HEADER, PREFIX, Source};
+use super::index::{FileIndex, FileSection, MAGIC, McapChannel, of_summary};
+use super::record::{self, InnerRecords, MAX_SIZE, MESSAGE_HEADER, PREFIX, RecordSource};
 use super::scan::{chunk_at, scan};
 
 /// Why a file is not read at all.
@@ -69,7 +69,7 @@ pub(super) struct SectionContents {
 
 /// A file of MCAP.
 pub(super) struct McapFile<R> {
-    source: Source<R>,
+    source: RecordSource<R>,
     pub(super) index: FileIndex,
 }
 
@@ -83,7 +83,7 @@ impl McapFile<BufReader<File>> {
 impl<R: Read + Seek> McapFile<R> {
     /// Returns the file that these bytes are.
     pub(super) fn of(bytes: R) -> Result<McapFile<R>, McapFault> {
-        let mut source = Source::new(bytes)?;
+        let mut source = RecordSource::new(bytes)?;
         let beginning = source.bytes_at(0, MAGIC.len() as u64)?;
         if beginning != MAGIC {
             return Err(McapFault::Other(what_it_is(&beginning)));
@@ -97,7 +97,7 @@ impl<R: Read + Seek> McapFile<R> {
 
     /// Returns the contents of a section, and notes what is damaged. Channels that the summary left out are
     /// added to the index.
-    pub(super) fn contents(&mut self, section: &Section) -> std::io::Result<SectionContents> {
+    pub(super) fn contents(&mut self, section: &FileSection) -> std::io::Result<SectionContents> {
         let bytes = match section.is_chunk {
             true => self.chunk(section)?,
             false => self.source.bytes_at(section.place, section.end - section.place)?,
@@ -127,7 +127,7 @@ impl<R: Read + Seek> McapFile<R> {
     }
 
     /// Returns the contents of a chunk; none if it is damaged, which is noted.
-    fn chunk(&mut self, section: &Section) -> std::io::Result<Vec<u8>> {
+    fn chunk(&mut self, section: &FileSection) -> std::io::Result<Vec<u8>> {
         let place = section.place;
         let head = self.source.head_at(place)?;
         let head = head.filter(|head| {

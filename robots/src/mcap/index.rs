@@ -10,7 +10,7 @@ use esl_bytecode::Bytes;
 use mcap::records::{ChunkIndex, Record, Statistics, op};
 
 use super::damage::Damage;
-use super::record::{self, InnerRecords, MAX_SIZE, PREFIX, Source};
+use super::record::{self, InnerRecords, MAX_SIZE, PREFIX, RecordSource};
 
 /// First and last bytes of a file.
 pub(super) const MAGIC: &[u8] = mcap::MAGIC;
@@ -50,7 +50,7 @@ pub struct McapChannel {
 
 /// Bytes of a file that hold messages: a chunk, or records outside of chunks.
 #[derive(Clone, Debug)]
-pub(super) struct Section {
+pub(super) struct FileSection {
     pub(super) is_chunk: bool,
     /// Place of the first record.
     pub(super) place: u64,
@@ -94,7 +94,7 @@ pub(super) struct FileIndex {
     pub(super) library: String,
     pub(super) schemas: BTreeMap<u16, Arc<McapSchema>>,
     pub(super) channels: BTreeMap<u16, Arc<McapChannel>>,
-    pub(super) sections: Vec<Section>,
+    pub(super) sections: Vec<FileSection>,
     /// Messages of each channel.
     pub(super) counts: BTreeMap<u16, u64>,
     /// Earliest and latest time of a message.
@@ -139,7 +139,7 @@ pub(super) fn widened(times: Option<(u64, u64)>, time: u64) -> (u64, u64) {
 
 /// Returns the index that the summary of a file is; `None` if it has none, or it does not hold the places of
 /// all messages.
-pub(super) fn of_summary<R: Read + Seek>(source: &mut Source<R>) -> std::io::Result<Option<FileIndex>> {
+pub(super) fn of_summary<R: Read + Seek>(source: &mut RecordSource<R>) -> std::io::Result<Option<FileIndex>> {
     let magic = MAGIC.len() as u64;
     let Some(footer) = source.length().checked_sub(magic + PREFIX + FOOTER).filter(|&place| place >= magic)
     else {
@@ -207,7 +207,7 @@ pub(super) fn of_summary<R: Read + Seek>(source: &mut Source<R>) -> std::io::Res
 /// Adds the header of a file to its index. Returns whether there is one.
 pub(super) fn add_header<R: Read + Seek>(
     index: &mut FileIndex,
-    source: &mut Source<R>,
+    source: &mut RecordSource<R>,
 ) -> std::io::Result<bool> {
     let place = MAGIC.len() as u64;
     let Some(head) = source.head_at(place)? else { return Ok(false) };
@@ -241,7 +241,7 @@ fn add_sections(index: &mut FileIndex, statistics: Statistics, chunks: &[ChunkIn
     }
     for chunk in chunks {
         index.note_chunk(&chunk.compression, chunk.compressed_size, chunk.uncompressed_size);
-        index.sections.push(Section {
+        index.sections.push(FileSection {
             is_chunk: true,
             place: chunk.chunk_start_offset,
             end: chunk.chunk_start_offset + chunk.chunk_length,

@@ -1,4 +1,4 @@
-//! What is known of a file: its channels and figures, as data and as the text that `mcap info` prints.
+//! The figures of a file: its channels and figures, as data and as the text that `mcap info` prints.
 
 use std::fmt;
 use std::sync::Arc;

@@ -28,10 +28,10 @@ mod writing;
 
 pub use bag::{BagMessages, McapBag};
 pub use damage::{Damage, DamageKind};
-pub use decode::PayloadForm;
+pub use decode::MessageForm;
 pub use file::McapFault;
 pub use index::{ChunkSizes, McapChannel, McapSchema, NamedRecord};
 pub use info::FileInfo;
 pub use order::{McapMessage, McapSelection};
-pub use output::{McapOutput, OutputChannel, OutputOptions};
+pub use output::{McapOutput, OutputChannel, OutputFault, OutputOptions};
 pub(crate) use rows::rows;

@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use super::decode::PayloadForm;
+use super::decode::MessageForm;
 use super::file::McapFile;
 use super::order::{McapSelection, OrderedMessages};
 
@@ -22,7 +22,7 @@ fn read(bytes: &[u8]) -> usize {
     let mut messages = OrderedMessages::new(&files, McapSelection::default());
     let mut count = 0;
     while let Ok(Some(message)) = messages.next(&mut files) {
-        _ = PayloadForm::of(&message.channel).decode(&message.channel.topic, &message.data);
+        _ = MessageForm::of(&message.channel).decode(&message.channel.topic, &message.data);
         count += 1;
         if count > 1000 {
             break;

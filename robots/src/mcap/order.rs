@@ -12,7 +12,7 @@ use std::sync::Arc;
 use esl_bytecode::Bytes;
 
 use super::file::{McapFault, McapFile, MessagePlace, SectionContents};
-use super::index::{McapChannel, Section};
+use super::index::{FileSection, McapChannel};
 
 /// Most bytes of sections that are in memory at the same time.
 const MOST_BYTES: u64 = 1 << 29;
@@ -70,7 +70,7 @@ type NextOfSection = Reverse<(u64, usize, u64, usize)>;
 pub(super) struct OrderedMessages {
     selection: McapSelection,
     /// Sections that are not open yet, latest first, with their files.
-    closed: Vec<(usize, Section)>,
+    closed: Vec<(usize, FileSection)>,
     open: Vec<Option<OpenSection>>,
     next: BinaryHeap<NextOfSection>,
     bytes: u64,
@@ -82,7 +82,7 @@ impl OrderedMessages {
         for (number, file) in files.iter().enumerate() {
             let is_wanted =
                 |id: &u16| file.channel(*id).is_none_or(|known| selection.has_topic(&known.topic));
-            let has_wanted = |section: &&Section| {
+            let has_wanted = |section: &&FileSection| {
                 let (first, last) = section.times;
                 last >= selection.start
                     && selection.end.is_none_or(|end| first <= end)
@@ -137,7 +137,7 @@ impl OrderedMessages {
         &mut self,
         files: &mut [McapFile<R>],
         number: usize,
-        section: &Section,
+        section: &FileSection,
     ) -> Result<(), McapFault> {
         let file = &mut files[number];
         let contents = file.contents(section)?;

@@ -5,6 +5,7 @@
 //! up to the second before.
 
 use std::collections::HashMap;
+use std::fmt;
 use std::fs::File;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -14,7 +15,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use tokio::sync::Notify;
 
-use super::sink::Sink;
+use super::sink::ByteSink;
 
 /// Longest time for which a message is not in a chunk that is written.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -25,7 +26,7 @@ const MOST_BYTES: usize = 16 << 20;
 /// Time for which parts are gathered before they are written.
 const GATHERED: Duration = Duration::from_millis(5);
 
-/// What a message takes beside its payload, in this count.
+/// Bytes of a message beside its payload, in this count.
 const OVERHEAD: usize = 64;
 
 /// The name of the writing library, in the header of each file.
@@ -53,6 +54,35 @@ impl Default for OutputOptions {
     }
 }
 
+/// Why a file is not written any more.
+#[derive(Clone, Debug)]
+pub enum OutputFault {
+    /// It has as many channels as a file can have.
+    Channels,
+    /// The crate or the system refuses.
+    Refused(Arc<mcap::McapError>),
+}
+
+impl fmt::Display for OutputFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            OutputFault::Channels => f.write_str("a file of MCAP has at most 65536 channels"),
+            OutputFault::Refused(error) => match &**error {
+                mcap::McapError::Io(error) => error.fmt(f),
+                error => error.fmt(f),
+            },
+        }
+    }
+}
+
+impl std::error::Error for OutputFault {}
+
+impl From<mcap::McapError> for OutputFault {
+    fn from(error: mcap::McapError) -> OutputFault {
+        OutputFault::Refused(Arc::new(error))
+    }
+}
+
 /// A channel to be written.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct OutputChannel {
@@ -67,7 +97,7 @@ pub struct OutputChannel {
 }
 
 /// A part of the file that is to be written.
-enum Part {
+enum FilePart {
     Channel(u16, OutputChannel),
     Message(MessageHeader, Bytes),
     Attachment(Attachment<'static>),
@@ -76,12 +106,12 @@ enum Part {
     Finish,
 }
 
-impl Part {
+impl FilePart {
     fn size(&self) -> usize {
         OVERHEAD
             + match self {
-                Part::Message(_, payload) => payload.len(),
-                Part::Attachment(attachment) => attachment.data.len(),
+                FilePart::Message(_, payload) => payload.len(),
+                FilePart::Attachment(attachment) => attachment.data.len(),
                 _ => 0,
             }
     }
@@ -89,13 +119,13 @@ impl Part {
 
 #[derive(Default)]
 struct QueueState {
-    parts: Vec<Part>,
+    parts: Vec<FilePart>,
     bytes: usize,
     /// Number of parts that were put in, and of those that are written.
     put: u64,
     written: u64,
     /// Why no more is written.
-    fault: Option<String>,
+    fault: Option<OutputFault>,
     is_finished: bool,
     /// Whether the parts are not to wait for more of them.
     is_hurried: bool,
@@ -119,7 +149,7 @@ impl Queue {
 
     /// Waits until there are parts, at most for this time if there is one, and takes them. They are gathered
     /// for a moment: to be woken for each takes longer than to write it.
-    fn take(&self, patience: Option<Duration>) -> Vec<Part> {
+    fn take(&self, patience: Option<Duration>) -> Vec<FilePart> {
         let is_empty = |state: &mut QueueState| state.parts.is_empty();
         let is_small = |state: &mut QueueState| !state.is_hurried && state.bytes < MOST_BYTES / 4;
         let mut state = match patience {
@@ -146,8 +176,8 @@ struct Channels {
     sequences: Vec<u32>,
 }
 
-/// What writes the parts.
-enum Target {
+/// The writer of the parts.
+enum PartTarget {
     /// A thread, by the queue.
     Thread,
     /// The caller.
@@ -158,8 +188,8 @@ enum Target {
 pub struct McapOutput {
     queue: Arc<Queue>,
     channels: Mutex<Channels>,
-    target: Target,
-    sink: Sink,
+    target: PartTarget,
+    sink: ByteSink,
 }
 
 impl McapOutput {
@@ -168,12 +198,12 @@ impl McapOutput {
     /// # Errors
     /// The system gives no thread, or does not write.
     pub fn begin(file: File, options: &OutputOptions) -> std::io::Result<McapOutput> {
-        let sink = Sink::new(Some(file));
+        let sink = ByteSink::new(Some(file));
         let mut writer = PartWriter::new(sink.clone(), options).map_err(std::io::Error::other)?;
         let queue = Arc::<Queue>::default();
         let work = queue.clone();
         std::thread::Builder::new().name("mcap".into()).spawn(move || writer.run(&work))?;
-        Ok(McapOutput { queue, channels: Mutex::default(), target: Target::Thread, sink })
+        Ok(McapOutput { queue, channels: Mutex::default(), target: PartTarget::Thread, sink })
     }
 
     /// Begins a file whose bytes [`McapOutput::take`] returns.
@@ -181,9 +211,9 @@ impl McapOutput {
     /// # Errors
     /// A setting that is refused.
     pub fn in_memory(options: &OutputOptions) -> std::io::Result<McapOutput> {
-        let sink = Sink::new(None);
+        let sink = ByteSink::new(None);
         let writer = PartWriter::new(sink.clone(), options).map_err(std::io::Error::other)?;
-        let target = Target::Caller(Mutex::new(writer));
+        let target = PartTarget::Caller(Mutex::new(writer));
         Ok(McapOutput { queue: Arc::default(), channels: Mutex::default(), target, sink })
     }
 
@@ -196,16 +226,15 @@ impl McapOutput {
     ///
     /// # Errors
     /// There are too many.
-    pub fn channel(&self, channel: OutputChannel) -> Result<u16, String> {
+    pub fn channel(&self, channel: OutputChannel) -> Result<u16, OutputFault> {
         let mut channels = self.channels();
         if let Some(&number) = channels.numbers.get(&channel) {
             return Ok(number);
         }
-        let number = u16::try_from(channels.sequences.len())
-            .map_err(|_| "a file of MCAP has at most 65536 channels".to_owned())?;
+        let number = u16::try_from(channels.sequences.len()).map_err(|_| OutputFault::Channels)?;
         channels.sequences.push(0);
         channels.numbers.insert(channel.clone(), number);
-        self.put(Part::Channel(number, channel));
+        self.put(FilePart::Channel(number, channel));
         Ok(number)
     }
 
@@ -220,7 +249,7 @@ impl McapOutput {
             sequence
         };
         let (log_time, publish_time) = times;
-        self.put(Part::Message(
+        self.put(FilePart::Message(
             MessageHeader { channel_id: channel, sequence, log_time, publish_time },
             payload,
         ))
@@ -229,28 +258,34 @@ impl McapOutput {
     /// Writes an attachment. Returns whether there is room for more.
     pub fn attach(&self, name: String, media_type: String, time: u64, data: &Bytes) -> bool {
         let data = std::borrow::Cow::Owned(data.to_vec());
-        self.put(Part::Attachment(Attachment { log_time: time, create_time: time, name, media_type, data }))
+        self.put(FilePart::Attachment(Attachment {
+            log_time: time,
+            create_time: time,
+            name,
+            media_type,
+            data,
+        }))
     }
 
     /// Writes a record of metadata.
     pub fn write_metadata(&self, name: String, metadata: Vec<(String, String)>) -> bool {
-        self.put(Part::Metadata(Metadata { name, metadata: metadata.into_iter().collect() }))
+        self.put(FilePart::Metadata(Metadata { name, metadata: metadata.into_iter().collect() }))
     }
 
     /// Ends the chunk, and hands it to the system.
     pub fn flush(&self) {
-        self.put(Part::Flush);
+        self.put(FilePart::Flush);
     }
 
     /// Completes the file, once.
     pub fn finish(&self) {
         if !std::mem::replace(&mut self.queue.state().is_finished, true) {
-            self.put(Part::Finish);
+            self.put(FilePart::Finish);
         }
     }
 
-    fn put(&self, part: Part) -> bool {
-        if let Target::Caller(writer) = &self.target {
+    fn put(&self, part: FilePart) -> bool {
+        if let PartTarget::Caller(writer) = &self.target {
             let written = writer.lock().unwrap_or_else(PoisonError::into_inner).write(part);
             if let Err(reason) = written {
                 self.queue.state().fault.get_or_insert(reason);
@@ -258,11 +293,11 @@ impl McapOutput {
             return true;
         }
         let mut state = self.queue.state();
-        let is_last = matches!(part, Part::Finish);
+        let is_last = matches!(part, FilePart::Finish);
         if state.fault.is_some() || state.is_finished && !is_last {
             return true;
         }
-        state.is_hurried |= is_last || matches!(part, Part::Flush);
+        state.is_hurried |= is_last || matches!(part, FilePart::Flush);
         let is_first = state.parts.is_empty();
         state.bytes += part.size();
         state.parts.push(part);
@@ -274,7 +309,7 @@ impl McapOutput {
     }
 
     /// Returns why nothing is written any more.
-    pub fn fault(&self) -> Option<String> {
+    pub fn fault(&self) -> Option<OutputFault> {
         self.queue.state().fault.clone()
     }
 
@@ -286,14 +321,14 @@ impl McapOutput {
     /// Returns whether all parts that were put in before this call are written, by their number.
     fn is_done(&self, until: u64) -> bool {
         let state = self.queue.state();
-        state.written >= until || state.fault.is_some() || matches!(self.target, Target::Caller(_))
+        state.written >= until || state.fault.is_some() || matches!(self.target, PartTarget::Caller(_))
     }
 
     /// Waits until all parts so far are written.
     ///
     /// # Errors
     /// Why they are not.
-    pub async fn written(&self) -> Result<(), String> {
+    pub async fn written(&self) -> Result<(), OutputFault> {
         let until = self.queue.state().put;
         loop {
             // The interest is there before the look.
@@ -309,7 +344,7 @@ impl McapOutput {
     ///
     /// # Errors
     /// As above.
-    pub fn wait(&self) -> Result<(), String> {
+    pub fn wait(&self) -> Result<(), OutputFault> {
         let until = self.queue.state().put;
         while !self.is_done(until) {
             std::thread::sleep(Duration::from_millis(1));
@@ -327,14 +362,14 @@ impl Drop for McapOutput {
 
 /// The writer of parts.
 struct PartWriter {
-    writer: Option<Writer<Sink>>,
-    sink: Sink,
+    writer: Option<Writer<ByteSink>>,
+    sink: ByteSink,
     /// Numbers of the schemas, from 1 on.
     schemas: HashMap<(String, String, Bytes), u16>,
 }
 
 impl PartWriter {
-    fn new(sink: Sink, options: &OutputOptions) -> Result<PartWriter, mcap::McapError> {
+    fn new(sink: ByteSink, options: &OutputOptions) -> Result<PartWriter, mcap::McapError> {
         let settings = WriteOptions::new()
             .library(LIBRARY)
             .profile(options.profile.clone())
@@ -360,18 +395,19 @@ impl PartWriter {
                 flushed = Instant::now();
             }
             let count = parts.len() as u64;
-            let is_last = parts.iter().any(|part| matches!(part, Part::Finish));
+            let is_last = parts.iter().any(|part| matches!(part, FilePart::Finish));
             let mut result = Ok(());
             for part in parts {
-                is_open |= !matches!(part, Part::Flush | Part::Finish);
+                is_open |= !matches!(part, FilePart::Flush | FilePart::Finish);
                 result = result.and_then(|()| self.write(part));
             }
             if is_open && flushed.elapsed() >= PERIOD {
-                result = result.and_then(|()| self.write(Part::Flush));
+                result = result.and_then(|()| self.write(FilePart::Flush));
                 flushed = Instant::now();
                 is_open = false;
             }
-            result = result.and_then(|()| self.sink.pass_on().map_err(|error| error.to_string()));
+            result =
+                result.and_then(|()| self.sink.pass_on().map_err(|error| mcap::McapError::Io(error).into()));
             let is_over = is_last || result.is_err();
             let mut state = queue.state();
             state.written += count;
@@ -384,23 +420,23 @@ impl PartWriter {
         }
     }
 
-    fn write(&mut self, part: Part) -> Result<(), String> {
+    fn write(&mut self, part: FilePart) -> Result<(), OutputFault> {
         let Some(writer) = &mut self.writer else { return Ok(()) };
         let written = match part {
-            Part::Channel(number, channel) => {
-                return self.write_channel(number, channel).map_err(|error| text_of(&error));
+            FilePart::Channel(number, channel) => {
+                return self.write_channel(number, channel).map_err(OutputFault::from);
             }
-            Part::Message(header, payload) => writer.write_to_known_channel(&header, &payload),
-            Part::Attachment(attachment) => writer.attach(&attachment),
-            Part::Metadata(metadata) => writer.write_metadata(&metadata),
-            Part::Flush => writer.flush(),
-            Part::Finish => {
+            FilePart::Message(header, payload) => writer.write_to_known_channel(&header, &payload),
+            FilePart::Attachment(attachment) => writer.attach(&attachment),
+            FilePart::Metadata(metadata) => writer.write_metadata(&metadata),
+            FilePart::Flush => writer.flush(),
+            FilePart::Finish => {
                 let finished = writer.finish().map(|_| ());
                 self.writer = None;
                 finished
             }
         };
-        written.map_err(|error| text_of(&error))
+        written.map_err(OutputFault::from)
     }
 
     fn write_channel(&mut self, number: u16, channel: OutputChannel) -> Result<(), mcap::McapError> {
@@ -423,13 +459,5 @@ impl PartWriter {
         let metadata = metadata.into_iter().collect();
         writer.add_channel_with_id(number, schema, &topic, &encoding, &metadata)?;
         Ok(())
-    }
-}
-
-/// Returns the text of an error: the one of the system, if it is one.
-fn text_of(error: &mcap::McapError) -> String {
-    match error {
-        mcap::McapError::Io(error) => error.to_string(),
-        error => error.to_string(),
     }
 }

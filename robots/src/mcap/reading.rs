@@ -11,7 +11,7 @@ use esl_bytecode::datum::Datum;
 use esl_host::{HostFailure, HostObject, IntoDatum, Keyword};
 
 use super::bag::McapBag;
-use super::decode::{DecodedPayload, PayloadForm};
+use super::decode::{DecodedPayload, MessageForm};
 use super::file::McapFault;
 use super::info::FileInfo;
 use super::order::{McapMessage, McapSelection, OrderedMessages};
@@ -26,7 +26,7 @@ const BYTES: usize = 1 << 18;
 const KEPT: usize = 1 << 24;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What is guarded is whole at every moment, so a panic elsewhere does not corrupt it.
+    // The guarded data are whole at every moment, so a panic elsewhere does not corrupt it.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -87,8 +87,8 @@ impl McapInput {
             let metadata: Vec<(String, String)> =
                 channel.metadata.iter().map(|(name, value)| (name.clone(), value.clone())).collect();
             let schema = channel.schema.as_deref();
-            let hash = match PayloadForm::of(channel) {
-                PayloadForm::Ros(of_type) => Some(of_type.hash().to_owned()),
+            let hash = match MessageForm::of(channel) {
+                MessageForm::Ros(of_type) => Some(of_type.hash().to_owned()),
                 _ => None,
             };
             let text = schema.map(|schema| match std::str::from_utf8(&schema.data) {
@@ -216,7 +216,7 @@ struct ReaderState {
     kept: BTreeMap<u64, (Datum, usize)>,
     bytes: usize,
     /// Forms of payloads, by file and channel.
-    forms: HashMap<(usize, u16), PayloadForm>,
+    forms: HashMap<(usize, u16), MessageForm>,
 }
 
 impl McapReader {
@@ -273,8 +273,8 @@ impl ReaderState {
     fn described(&mut self, message: McapMessage, is_raw: bool) -> Datum {
         let McapMessage { file, channel, sequence, log_time, publish_time, data } = message;
         let form = match is_raw {
-            true => &PayloadForm::Bytes,
-            false => self.forms.entry((file, channel.id)).or_insert_with(|| PayloadForm::of(&channel)),
+            true => &MessageForm::Bytes,
+            false => self.forms.entry((file, channel.id)).or_insert_with(|| MessageForm::of(&channel)),
         };
         let DecodedPayload { form, data } = form.decode(&channel.topic, &data);
         let parts = [

@@ -56,15 +56,15 @@ impl RecordHead {
 }
 
 /// A place to read from, with its length.
-pub(super) struct Source<R> {
+pub(super) struct RecordSource<R> {
     inner: R,
     length: u64,
 }
 
-impl<R: Read + Seek> Source<R> {
-    pub(super) fn new(mut inner: R) -> std::io::Result<Source<R>> {
+impl<R: Read + Seek> RecordSource<R> {
+    pub(super) fn new(mut inner: R) -> std::io::Result<RecordSource<R>> {
         let length = inner.seek(SeekFrom::End(0))?;
-        Ok(Source { inner, length })
+        Ok(RecordSource { inner, length })
     }
 
     pub(super) fn length(&self) -> u64 {

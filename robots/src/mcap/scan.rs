@@ -8,9 +8,9 @@ use std::io::{Read, Seek};
 use mcap::records::{Record, op};
 
 use super::damage::{Damage, DamageKind};
-use super::index::{FileIndex, MAGIC, NamedRecord, Section, add_header, widened};
+use super::index::{FileIndex, FileSection, MAGIC, NamedRecord, add_header, widened};
 use super::record::{
-    self, CHUNK_BEGINNING, InnerRecords, MAX_SIZE, MESSAGE_HEADER, PREFIX, RecordHead, Source,
+    self, CHUNK_BEGINNING, InnerRecords, MAX_SIZE, MESSAGE_HEADER, PREFIX, RecordHead, RecordSource,
 };
 
 /// Bytes of messages outside of chunks that are one section.
@@ -28,24 +28,24 @@ fn is_kind(opcode: u8) -> bool {
 }
 
 /// A scan in progress.
-struct Scan<'a, R> {
-    source: &'a mut Source<R>,
+struct FileScan<'a, R> {
+    source: &'a mut RecordSource<R>,
     index: FileIndex,
     /// Place of the next record.
     place: u64,
     /// The section of messages outside of chunks that is growing.
-    loose: Option<Section>,
+    loose: Option<FileSection>,
     /// The damage of the last chunk, whose indexes tell what is lost.
     broken: Option<usize>,
     is_over: bool,
 }
 
 /// Returns the index of a file that begins with its magic bytes.
-pub(super) fn scan<R: Read + Seek>(source: &mut Source<R>) -> std::io::Result<FileIndex> {
+pub(super) fn scan<R: Read + Seek>(source: &mut RecordSource<R>) -> std::io::Result<FileIndex> {
     let mut index = FileIndex::default();
     let place = MAGIC.len() as u64;
     _ = add_header(&mut index, source)?;
-    let mut scan = Scan { source, index, place, loose: None, broken: None, is_over: false };
+    let mut scan = FileScan { source, index, place, loose: None, broken: None, is_over: false };
     while !scan.is_over {
         scan.step()?;
     }
@@ -53,7 +53,7 @@ pub(super) fn scan<R: Read + Seek>(source: &mut Source<R>) -> std::io::Result<Fi
     Ok(scan.index)
 }
 
-impl<R: Read + Seek> Scan<'_, R> {
+impl<R: Read + Seek> FileScan<'_, R> {
     fn note(&mut self, damage: Damage) {
         if self.index.damage.len() < MOST_DAMAGE {
             self.index.damage.push(damage);
@@ -218,7 +218,7 @@ impl<R: Read + Seek> Scan<'_, R> {
             _ => {
                 self.end_section();
                 let (place, times, channels) = (self.place, (time, time), Vec::new());
-                self.loose = Some(Section { is_chunk: false, place, end, times, channels });
+                self.loose = Some(FileSection { is_chunk: false, place, end, times, channels });
             }
         }
         *self.index.counts.entry(header.channel_id).or_default() += 1;
@@ -270,7 +270,7 @@ impl<R: Read + Seek> Scan<'_, R> {
             }
         }
         let end = place + PREFIX + head.length;
-        let section = times.map(|times| Section { is_chunk: true, place, end, times, channels });
+        let section = times.map(|times| FileSection { is_chunk: true, place, end, times, channels });
         self.index.sections.extend(section);
         Ok(())
     }
@@ -326,7 +326,7 @@ fn attachment_head(body: &[u8], place: u64) -> Option<NamedRecord> {
 
 /// Returns the header and the contents of the chunk at a place, or why it cannot be read.
 pub(super) fn chunk_at<R: Read + Seek>(
-    source: &mut Source<R>,
+    source: &mut RecordSource<R>,
     place: u64,
     head: RecordHead,
 ) -> std::io::Result<Result<(mcap::records::ChunkHeader, Vec<u8>), DamageKind>> {

@@ -17,12 +17,12 @@ struct SinkState {
 
 /// A sink of bytes. Clones are the same.
 #[derive(Clone, Default)]
-pub(super) struct Sink(Arc<Mutex<SinkState>>);
+pub(super) struct ByteSink(Arc<Mutex<SinkState>>);
 
-impl Sink {
+impl ByteSink {
     /// Returns a sink that writes to a file; without one, a sink that keeps all bytes until they are taken.
-    pub(super) fn new(file: Option<File>) -> Sink {
-        Sink(Arc::new(Mutex::new(SinkState { file, ..SinkState::default() })))
+    pub(super) fn new(file: Option<File>) -> ByteSink {
+        ByteSink(Arc::new(Mutex::new(SinkState { file, ..SinkState::default() })))
     }
 
     fn state(&self) -> MutexGuard<'_, SinkState> {
@@ -52,7 +52,7 @@ impl SinkState {
     }
 }
 
-impl Write for Sink {
+impl Write for ByteSink {
     fn write(&mut self, bytes: &[u8]) -> Result<usize> {
         let mut state = self.state();
         state.kept.extend_from_slice(bytes);
@@ -63,14 +63,14 @@ impl Write for Sink {
         Ok(bytes.len())
     }
 
-    /// Does nothing: [`Sink::pass_on`] is called where bytes have to be safe.
+    /// Does nothing: [`ByteSink::pass_on`] is called where bytes have to be safe.
     fn flush(&mut self) -> Result<()> {
         Ok(())
     }
 }
 
 /// Tells the position only.
-impl Seek for Sink {
+impl Seek for ByteSink {
     fn seek(&mut self, place: SeekFrom) -> Result<u64> {
         match place {
             SeekFrom::Current(0) | SeekFrom::End(0) => Ok(self.state().written),

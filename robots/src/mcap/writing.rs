@@ -1,5 +1,6 @@
 //! Writing by a program: files, and the channels that it has opened in them.
 
+use std::collections::BTreeMap;
 use std::fs::OpenOptions;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -16,7 +17,7 @@ use crate::message::{MessageType, Types, encode};
 pub(super) struct McapWriter {
     pub(super) output: McapOutput,
     /// The types of the channels of ROS 2, by their numbers.
-    types: Mutex<Vec<(u16, Arc<MessageType>)>>,
+    types: Mutex<BTreeMap<u16, Arc<MessageType>>>,
 }
 
 impl HostObject for McapWriter {
@@ -58,8 +59,8 @@ impl McapWriter {
         Ok(McapWriter { output, types: Mutex::default() })
     }
 
-    fn types(&self) -> MutexGuard<'_, Vec<(u16, Arc<MessageType>)>> {
-        // The list is whole at every moment, so a panic elsewhere does not corrupt it.
+    fn types(&self) -> MutexGuard<'_, BTreeMap<u16, Arc<MessageType>>> {
+        // The map is whole at every moment, so a panic elsewhere does not corrupt it.
         self.types.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -78,7 +79,7 @@ impl McapWriter {
         let of_type = types.message(name)?;
         let channel = ros_channel(topic, &types, &of_type, metadata)?;
         let number = self.output.channel(channel).map_err(failure)?;
-        self.types().push((number, of_type));
+        self.types().insert(number, of_type);
         Ok(number)
     }
 
@@ -98,8 +99,7 @@ impl McapWriter {
         if let Some(reason) = self.output.fault() {
             return Err(failure(reason));
         }
-        let of_type =
-            self.types().iter().find(|(known, _)| *known == channel).map(|(_, found)| found.clone());
+        let of_type = self.types().get(&channel).cloned();
         let payload = match of_type {
             Some(of_type) => Bytes::from(encode(&of_type, message)?),
             None => Payload::from_argument(message)?.0,

@@ -19,7 +19,8 @@ mod topic;
 mod types;
 mod wire;
 
-use crate::message::{Types, complete};
+use crate::message::{Types, complete, encode};
+use crate::run::{is_on, note_topic};
 use crate::zenoh::session::ZenohSession;
 use node::RosNode;
 use qos::QosArgument;
@@ -111,6 +112,22 @@ fn add_types(rows: &mut HostRows, types: &Types) {
                 ]));
             }
             Ok(described(&[("MESSAGE", known.message(&name)?.description())]))
+        },
+    )
+    .everywhere();
+    rows.at_once("%ROS-IS-NOTED", [], "Returns whether a recorder of the run hears of messages.", || {
+        Ok(is_on())
+    })
+    .everywhere();
+    let known = types.clone();
+    rows.at_once(
+        "%ROS-NOTE",
+        ["topic", "type", "message"],
+        "Tells the recorder of the run of MESSAGE, in a graph in memory.",
+        move |topic: String, of_type: String, message: Datum| {
+            let of_type = types::message(&known, &of_type)?;
+            note_topic(&topic, &of_type, &encode(&of_type, &message)?);
+            Ok(())
         },
     )
     .everywhere();

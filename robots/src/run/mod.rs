@@ -7,13 +7,15 @@
 
 mod host;
 mod json;
+mod live;
 mod log;
 mod recorder;
 mod tap;
 
 pub use host::ObservedHost;
+pub use live::{LiveFault, LiveServer};
 pub use recorder::RunRecorder;
-pub(crate) use tap::note_topic;
+pub(crate) use tap::{is_on, note_topic};
 
 /// Takes the messages of a run.
 pub trait RunSink: Send + Sync {
@@ -32,5 +34,40 @@ impl RunSink for crate::mcap::McapOutput {
 
     fn message(&self, channel: u16, time: u64, payload: esl_bytecode::Bytes) {
         self.write(channel, (time, time), None, payload);
+    }
+}
+
+/// Sinks that take the same messages.
+pub struct RunSinks {
+    sinks: Vec<std::sync::Arc<dyn RunSink>>,
+    /// Numbers of each channel in the sinks.
+    channels: std::sync::RwLock<Vec<Vec<Option<u16>>>>,
+}
+
+impl RunSinks {
+    /// Returns these sinks as one.
+    pub fn new(sinks: Vec<std::sync::Arc<dyn RunSink>>) -> RunSinks {
+        RunSinks { sinks, channels: std::sync::RwLock::default() }
+    }
+}
+
+impl RunSink for RunSinks {
+    fn channel(&self, channel: crate::mcap::OutputChannel) -> Option<u16> {
+        let numbers = self.sinks.iter().map(|sink| sink.channel(channel.clone())).collect();
+        // The list is whole at every moment, so a panic elsewhere does not corrupt it.
+        let mut channels = self.channels.write().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let number = u16::try_from(channels.len()).ok()?;
+        channels.push(numbers);
+        Some(number)
+    }
+
+    fn message(&self, channel: u16, time: u64, payload: esl_bytecode::Bytes) {
+        let channels = self.channels.read().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let Some(numbers) = channels.get(usize::from(channel)) else { return };
+        for (sink, number) in self.sinks.iter().zip(numbers) {
+            if let Some(number) = number {
+                sink.message(*number, time, payload.clone());
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What an observer of a run is told, as messages.
+//! Events of a run, as an observer is told of them, as messages.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -39,7 +39,7 @@ struct RecorderState {
     lines: [Vec<u8>; 2],
 }
 
-struct Recorder {
+struct RecordedRun {
     sink: Arc<dyn RunSink>,
     /// Time at which the run began, in nanoseconds since 1970.
     start: u64,
@@ -52,7 +52,7 @@ struct Recorder {
 
 /// A recorder of a run. Clones are the same.
 #[derive(Clone)]
-pub struct RunRecorder(Arc<Recorder>);
+pub struct RunRecorder(Arc<RecordedRun>);
 
 /// Schemas of the channels that are not topics of ROS 2.
 fn schema(name: &str, properties: &Value) -> (String, String, Bytes) {
@@ -64,7 +64,7 @@ impl RunRecorder {
     /// Returns a recorder of a run that begins at this time, in nanoseconds since 1970. It hears of the
     /// topics of ROS 2 of the process from now on.
     pub fn begin(sink: Arc<dyn RunSink>, start: u64) -> RunRecorder {
-        let recorder = Recorder {
+        let recorder = RecordedRun {
             sink,
             start,
             latest: AtomicU64::new(0),

@@ -15,9 +15,14 @@ pub(super) fn set(recorder: Option<RunRecorder>) {
     *RECORDER.write().unwrap_or_else(PoisonError::into_inner) = recorder;
 }
 
+/// Returns whether there is a recorder.
+pub(crate) fn is_on() -> bool {
+    IS_ON.load(Ordering::Relaxed)
+}
+
 /// Tells the recorder, if there is one, of a message under a topic.
 pub(crate) fn note_topic(topic: &str, of_type: &MessageType, payload: &[u8]) {
-    if IS_ON.load(Ordering::Relaxed)
+    if is_on()
         && let Some(recorder) = &*RECORDER.read().unwrap_or_else(PoisonError::into_inner)
     {
         recorder.note_topic(topic, of_type, payload);

@@ -4,8 +4,9 @@
 //! The libraries are packages of the Python registry, which the tests install below `target/`. Where that is
 //! not possible, the tests that need them are left out, and say so.
 
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
@@ -15,7 +16,8 @@ use esl_conformance::process;
 use crate::eslvm;
 
 /// Packages of the peers.
-const PACKAGES: [&str; 3] = ["mcap==1.6.0", "mcap-ros2-support==0.6.0", "rosbags==0.11.9"];
+const PACKAGES: [&str; 4] =
+    ["mcap==1.6.0", "mcap-ros2-support==0.6.0", "rosbags==0.11.9", "websockets==17.4"];
 
 /// Returns the Python that has the packages, which are installed by the first call; nothing if they cannot
 /// be.
@@ -25,7 +27,7 @@ fn python() -> Option<&'static Path> {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mcap-venv");
         let python = folder.join("bin/python");
         let has_packages = || {
-            let import = ["-c", "import mcap, mcap_ros2, rosbags"];
+            let import = ["-c", "import mcap, mcap_ros2, rosbags, websockets"];
             Command::new(&python).args(import).output().is_ok_and(|done| done.status.success())
         };
         if has_packages() {
@@ -343,4 +345,48 @@ fn the_file_of_a_killed_run_is_readable() {
     let facts = lines(&done.output).into_iter().find(|line| line.contains("/esl/facts/alive"));
     let count = facts.and_then(|line| line.split_whitespace().nth(2)?.parse::<u64>().ok());
     assert!(count.is_some_and(|count| count > 20), "{}", done.output);
+}
+
+#[test]
+fn a_client_of_foxglove_sees_the_run_while_it_goes_on() {
+    let Some(python) = python() else { return };
+    let text = "(define-property battery ())
+(dotimes (i 1200) (assert (list 'battery i)) (sleep 0.05))";
+    let folder = Folder::with("foxglove", &[("main.esl", text)]);
+    let mut command = eslvm(&["run", "--foxglove=0", "--mcap", "run.mcap", "main.esl"]);
+    let mut run =
+        command.current_dir(folder.path()).stderr(Stdio::piped()).spawn().expect("it can be started");
+    let mut errors = BufReader::new(run.stderr.take().expect("it is a pipe")).lines();
+    let line = errors.next().and_then(Result::ok).unwrap_or_default();
+    let port =
+        line.strip_prefix("; Foxglove at ws://127.0.0.1:").unwrap_or_else(|| panic!("{line}")).to_owned();
+    let script = esl_conformance::root().join("robots/tests/peers/foxglove_client.py");
+    let mut client = Command::new(python);
+    let client = client.arg(script).args([&port, "/esl/facts/battery"]).stdout(Stdio::piped()).spawn();
+    let mut client = client.expect("python can be started");
+    let mut told = BufReader::new(client.stdout.take().expect("it is a pipe")).lines().map_while(Result::ok);
+    let mut next = || told.next().unwrap_or_default();
+    assert_eq!((next(), next()), ("protocol foxglove.sdk.v1".into(), "server main.esl".into()));
+    assert_eq!(next(), "channel /esl/facts/battery json esl.Fact");
+    for _ in 0..3 {
+        let message = next();
+        assert!(message.starts_with("message /esl/facts/battery "), "{message}");
+        assert!(message.contains("\"fact\":\"(BATTERY "), "{message}");
+    }
+    // However the run ends, the client hears of the end.
+    let pid = run.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().is_ok_and(|status| status.success()));
+    while !matches!(next().as_str(), "closed" | "") {}
+    drop((client.wait(), run.wait()));
+    // The file has the same.
+    let done = self::run(&folder, &["mcap", "info", "run.mcap"]);
+    assert!(done.status == Some(0) && done.output.contains("/esl/facts/battery"), "{}", done.output);
+}
+
+#[test]
+fn a_run_is_shown_to_this_machine_only() {
+    let folder = Folder::with("foxglove-exposed", &[("main.esl", "(print 1)")]);
+    let done = run(&folder, &["run", "--foxglove=0.0.0.0:0", "main.esl"]);
+    assert_eq!((done.status, &*done.output), (Some(2), ""));
+    assert!(done.errors.contains("others could hear what is said at 0.0.0.0:0"), "{}", done.errors);
 }

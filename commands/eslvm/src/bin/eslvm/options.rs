@@ -7,7 +7,7 @@ use esl::Config;
 use esl::size::{parse_size, parse_stack};
 use esl_vm::value::Value;
 use esl_vm::vm::Tier;
-use eslvm::mcap::McapAction;
+use eslvm::mcap::{McapAction, RunFileOptions};
 use eslvm::operate::OperateOptions;
 use eslvm::profile::ProfileUnit;
 use eslvm::replay::ReplayOptions;
@@ -77,10 +77,6 @@ pub(crate) enum EslvmAction {
         /// Record the run in a file, for `eslvm replay`: the program, and everything that reaches it
         #[arg(long, value_name = "FILE")]
         record: Option<PathBuf>,
-        /// Write the run to a file of MCAP, which Foxglove shows: tasks, failures, facts, inputs, operations,
-        /// output, and topics of ROS 2. Needs a build with the cargo feature `robots`
-        #[arg(long, value_name = "FILE")]
-        mcap: Option<PathBuf>,
         /// Write a profile of ticks and time by task, call and line to a file: a flame graph if its name ends
         /// in `.svg`, for speedscope if it ends in `.json`, else a line for each stack
         #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
@@ -98,6 +94,8 @@ pub(crate) enum EslvmAction {
         /// Show all calls of the library in reports of failures, which are folded otherwise
         #[arg(long)]
         full: bool,
+        #[command(flatten)]
+        files: RunFileOptions,
         #[command(flatten)]
         operate: OperateOptions,
         /// Source or bytecode file; `-` is a source from standard input

@@ -10,7 +10,7 @@ use esl_command::{USAGE, complain, refuse_overwriting};
 use esl_replay::{FileRecorder, RunSetup};
 use esl_timeline::Timeline;
 use esl_vm::vm::Tier;
-use eslvm::mcap::McapRecording;
+use eslvm::mcap::{McapRecording, RunFileOptions};
 use eslvm::operate::OperateOptions;
 use eslvm::profile::{INTERVAL, Profile, ProfileUnit};
 use eslvm::signal::{SignalTarget, end_on_signal};
@@ -25,7 +25,7 @@ pub(crate) struct RunReports<'a> {
     pub(crate) tier: Option<TierChoice>,
     pub(crate) timeline: Option<&'a Path>,
     pub(crate) record: Option<&'a Path>,
-    pub(crate) mcap: Option<&'a Path>,
+    pub(crate) files: &'a RunFileOptions,
     pub(crate) profile: Option<&'a Path>,
     pub(crate) profile_unit: ProfileUnit,
     pub(crate) coverage: Option<&'a Path>,
@@ -54,12 +54,12 @@ pub(crate) fn run(
         profile_unit,
         coverage,
         record,
-        mcap,
+        files,
         trace,
         operate,
         is_quiet,
     } = *reports;
-    for output in [timeline, profile, coverage, record, mcap].into_iter().flatten() {
+    for output in [timeline, profile, coverage, record, files.mcap.as_deref()].into_iter().flatten() {
         refuse_overwriting(output, [file])?;
     }
     let signals = SignalTarget::default();
@@ -80,13 +80,11 @@ pub(crate) fn run(
         Some(path) => Some((FileRecorder::create(path).map_err(|error| not_written(path, &error))?, path)),
         None => None,
     };
-    let mcap = match mcap {
-        Some(path) => Some((McapRecording::begin(path, &mut host)?, path)),
-        None => None,
-    };
+    let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+    let mcap = McapRecording::begin(files, &name, &mut host)?;
     let recorder = recording.as_ref().map(|(recorder, _)| recorder);
     let host: Box<dyn Host + Send> = match &mcap {
-        Some((mcap, _)) => recorded(mcap.host(host), recorder),
+        Some(mcap) => recorded(mcap.host(host), recorder),
         None => recorded(host, recorder),
     };
     let mut machine = program::machine(options.config(), host).map_err(setup)?;
@@ -106,7 +104,7 @@ pub(crate) fn run(
         }
         None => None,
     };
-    if let Some((mcap, _)) = &mcap {
+    if let Some(mcap) = &mcap {
         mcap.watch(&mut machine);
     }
     if is_covered {
@@ -118,7 +116,6 @@ pub(crate) fn run(
     if let (Some(_), Some(reason)) = (tier, &machine.tier().1.refused) {
         eprintln!("eslvm: --tier has no effect: {reason}");
     }
-    let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let served = operate.begin(&mut machine, &name)?;
     if let Some((recorder, path_of_record)) = &recording {
         let folders = path.folders().iter().map(|folder| folder.to_string_lossy().into_owned()).collect();
@@ -165,10 +162,10 @@ pub(crate) fn run(
     {
         status = not_written(path, &error);
     }
-    if let Some((mcap, path)) = mcap
-        && let Err(error) = mcap.end(&mut machine)
+    if let Some(mcap) = mcap
+        && let Err(refused) = mcap.end(&mut machine)
     {
-        status = not_written(path, &error);
+        status = refused;
     }
     if let (Some(path), Some(found)) = (profile, &found)
         && let Err(error) = found.write(path, profile_unit)
