@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 
 use esl_bytecode::datum::Datum;
 
+use super::external_clock::{ClockStep, ExternalClock};
 use super::question::{Asking, Question};
 use super::sender::Admission;
 use super::survey::Inspections;
@@ -85,6 +86,7 @@ struct InboxState {
     inspections: Mutex<Inspections>,
     admission: Admission,
     asking: Asking,
+    clock: ExternalClock,
     /// A bit for each signal of the process that the program handles, by number.
     handled: AtomicU32,
     /// Whom to wake when the inbox is rung.
@@ -193,6 +195,36 @@ impl Inbox {
         } else {
             Wake::Arrival
         }
+    }
+
+    /// Tells the time of day, in nanoseconds since 1970, to a host that goes by an external clock.
+    pub fn set_time(&self, time: i64) -> ClockStep {
+        self.0.clock.set(time, || self.ring())
+    }
+
+    /// Returns whether the host goes by an external clock, whose time [`Inbox::set_time`] tells.
+    pub fn has_external_clock(&self) -> bool {
+        self.0.clock.is_used()
+    }
+
+    /// Returns the time of day that was told last, in nanoseconds since 1970, if the host goes by an external
+    /// clock; 0 before the first.
+    pub fn told_time(&self) -> Option<i64> {
+        self.has_external_clock().then(|| self.0.clock.time())
+    }
+
+    pub(super) fn external_clock(&self) -> &ExternalClock {
+        &self.0.clock
+    }
+
+    /// Ends the ringing if nothing is there, inspections included. Returns whether that is so.
+    pub(super) fn quieten_if_empty(&self) -> bool {
+        let contents = self.contents();
+        let is_empty = contents.is_empty() && self.inspections().list.is_empty();
+        if is_empty {
+            self.0.is_rung.store(false, Ordering::Relaxed);
+        }
+        is_empty
     }
 
     /// Ends the ringing if nothing is there but inspections, which are about to be taken.

@@ -3,8 +3,9 @@
 //! | module | content |
 //! | --- | --- |
 //! | `host` | [`Host`]: clocks, streams, files and arguments as a trait |
-//! | `real`, `real_output` | [`RealHost`]: the operating system |
+//! | `real`, `real_files`, `real_output` | [`RealHost`]: the operating system |
 //! | `virtual_host` | [`VirtualHost`]: an outside in memory, whose time passes only in waits |
+//! | `external_clock` | the time of a simulator, which the outside tells a host |
 //! | `record`, `replay` | [`RecordingHost`] and [`ReplayHost`]: the answers of a host, kept and given again |
 //! | `inbox`, `signal` | [`Inbox`]: unrequested events, from any thread; the signals of the process |
 //! | `function`, `argument`, `value` | [`HostRows`]: functions of the host, each declared once, with typed arguments and values |
@@ -35,6 +36,7 @@ mod argument;
 mod asked;
 mod canary;
 mod console;
+mod external_clock;
 mod function;
 mod host;
 mod inbox;
@@ -42,6 +44,7 @@ mod input;
 mod operation;
 mod question;
 mod real;
+mod real_files;
 #[cfg(unix)]
 mod real_output;
 mod record;
@@ -56,6 +59,7 @@ mod value;
 mod virtual_host;
 
 pub use argument::{ArgumentList, ArgumentReader, FromArgument, FromCall, Payload};
+pub use external_clock::ClockStep;
 pub use function::{
     BeginFuture, Completion, DataFunction, Handler, HostFunction, HostModule, HostRow, HostRows, Need,
     OperationFuture, definitions,
@@ -68,7 +72,8 @@ pub use inbox::{Inbox, Incoming};
 pub use input::HostInput;
 pub use operation::{HostFailure, HostOperation, News};
 pub use question::{Answer, FunctionRef, Kept, Pending, Question, TaskInfo};
-pub use real::{RealHost, Screen, request_of_files};
+pub use real::{RealHost, Screen};
+pub use real_files::request_of_files;
 pub use record::{NotedRecord, QuestionHash, Record, Recorder, Recording, RecordingHost};
 pub use replay::{Divergence, ReplayHost};
 pub use rights::{Permit, Right, Rights};

@@ -12,6 +12,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use super::real_files::request_of_files;
 #[cfg(unix)]
 use super::real_output::{OutputState, PIECE, await_room, with_descriptor};
 use super::rights::{permit, resolve};
@@ -51,6 +52,8 @@ pub struct RealHost {
     screen: Option<Screen>,
     /// Nanoseconds of virtual time, if time is virtual.
     virtual_time: Option<u64>,
+    /// Whether the outside tells the time.
+    is_external: bool,
     /// Seconds of the program's clock in a second.
     speed: f64,
 }
@@ -70,6 +73,7 @@ impl RealHost {
             outputs: Default::default(),
             screen: None,
             virtual_time: None,
+            is_external: false,
             speed: 1.0,
         }
     }
@@ -96,12 +100,37 @@ impl RealHost {
         self
     }
 
+    /// Takes the time from [`Inbox::set_time`], such as that of a simulator, in place of real time. It stands
+    /// still until then. From a signal on that ends the run, time passes as real time does, so that cleanups
+    /// have an end.
+    #[must_use]
+    pub fn with_external_time(mut self) -> RealHost {
+        self.is_external = true;
+        self.inbox.external_clock().begin();
+        self
+    }
+
     /// Has so many seconds of the program's clock pass in a second of real time: for a program whose outside
     /// is a simulator that is as fast. The wall clock is not affected.
     #[must_use]
     pub fn with_speed(mut self, speed: f64) -> RealHost {
         self.speed = speed;
         self
+    }
+
+    /// Waits until the outside tells a time that reaches `deadline`, or something arrives.
+    fn wait_for_outside(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        let clock = self.inbox.external_clock();
+        let (left, is_due) = clock.begin_wait(deadline);
+        if !is_due {
+            self.inbox.wait(left.map(Duration::from_nanos));
+        }
+        clock.end_wait();
+        if awaited.input && self.input.lock().is_some() {
+            return Wake::Arrival;
+        }
+        // The clock itself may have rung.
+        if self.inbox.quieten_if_empty() { Wake::Time } else { self.inbox.why_rung() }
     }
 
     /// Makes sure that a chunk of input is requested.
@@ -149,22 +178,6 @@ fn error_of(error: &std::io::Error) -> HostError {
     HostError::from(error)
 }
 
-/// Returns the names of what is in a folder, in order; those of folders end in `/`.
-fn names_in(folder: &str) -> std::io::Result<Vec<String>> {
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder)? {
-        let entry = entry?;
-        let mut name = entry.file_name().to_string_lossy().into_owned();
-        // A link counts as what it leads to.
-        if entry.path().is_dir() {
-            name.push('/');
-        }
-        names.push(name);
-    }
-    names.sort();
-    Ok(names)
-}
-
 fn nanoseconds(duration: Duration) -> u64 {
     let whole = duration.as_secs().saturating_mul(1_000_000_000);
     whole.saturating_add(duration.subsec_nanos().into())
@@ -183,6 +196,7 @@ impl Host for RealHost {
     fn monotonic(&mut self) -> u64 {
         match self.virtual_time {
             Some(time) => time,
+            None if self.is_external => self.inbox.external_clock().elapsed(),
             None => nanoseconds(scaled(self.start.elapsed(), self.speed)),
         }
     }
@@ -209,6 +223,9 @@ impl Host for RealHost {
     fn wall_clock(&mut self) -> i64 {
         if let Some(time) = self.virtual_time {
             return VIRTUAL_BEGINNING.saturating_add_unsigned(time);
+        }
+        if self.is_external {
+            return self.inbox.external_clock().time();
         }
         let since = |time: Result<Duration, std::time::SystemTimeError>| match time {
             Ok(after) => i64::try_from(after.as_nanos()).unwrap_or(i64::MAX),
@@ -237,6 +254,9 @@ impl Host for RealHost {
             }
             (_, deadline) => deadline,
         };
+        if self.is_external && (deadline.is_some() || awaited != Awaited::default()) {
+            return self.wait_for_outside(deadline, awaited);
+        }
         let time = match deadline {
             None if awaited == Awaited::default() => return Wake::Never,
             None => None,
@@ -361,46 +381,19 @@ impl Host for RealHost {
     fn inbox(&self) -> Inbox {
         self.inbox.clone()
     }
-}
 
-/// Does something with files of the system, which may take its time.
-///
-/// # Errors
-/// [`HostError`].
-pub fn request_of_files(request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
-    let answer = match request {
-        FileRequest::List(folder) => names_in(folder).map(FileAnswer::Names),
-        FileRequest::Rename(from, to) => std::fs::rename(from, to).map(|()| FileAnswer::Done(true)),
-        FileRequest::Date(path) => {
-            std::fs::metadata(path).and_then(|metadata| metadata.modified()).map(|time| {
-                let seconds = |duration: Duration| i64::try_from(duration.as_secs()).unwrap_or(i64::MAX);
-                let since = time.duration_since(UNIX_EPOCH);
-                FileAnswer::Date(since.map_or_else(|before| -seconds(before.duration()), seconds))
-            })
+    fn poll(&mut self, round: u64) -> Vec<Incoming> {
+        _ = round;
+        let contents = self.inbox.take();
+        let ends = |incoming: &Incoming| match incoming {
+            Incoming::Signal(signal) => signal.ends_a_run() && !self.inbox.is_handled(*signal),
+            _ => false,
+        };
+        if self.is_external && contents.iter().any(ends) {
+            self.inbox.external_clock().release();
         }
-        FileRequest::TrueName(path) => true_name(path).map(|name| FileAnswer::Names(vec![name])),
-        FileRequest::MakeFolders(path) => {
-            let is_there = std::path::Path::new(path).is_dir();
-            std::fs::create_dir_all(path).map(|()| FileAnswer::Done(!is_there))
-        }
-    };
-    answer.map_err(|error| error_of(&error))
-}
-
-fn true_name(path: &str) -> std::io::Result<String> {
-    use std::io::{Error, ErrorKind};
-    let found = std::fs::canonicalize(path).map_err(|error| match error.kind() {
-        // A part of the path is a file.
-        ErrorKind::NotADirectory => ErrorKind::NotFound.into(),
-        _ => error,
-    })?;
-    let is_folder = found.is_dir();
-    let name = found.into_os_string().into_string();
-    let mut name = name.map_err(|_| Error::other("its name is not text"))?;
-    if is_folder && !name.ends_with('/') {
-        name.push('/');
+        contents
     }
-    Ok(name)
 }
 
 #[cfg(test)]
@@ -424,6 +417,37 @@ mod tests {
         let deadline = host.monotonic() + 1;
         assert_eq!(host.wait(Some(deadline), Awaited::default()), Wake::Time);
         assert!(host.monotonic() >= deadline);
+    }
+
+    #[test]
+    fn an_external_clock_ends_a_wait_when_its_time_is_told() {
+        let mut host = RealHost::new(Vec::new()).with_external_time();
+        let inbox = host.inbox();
+        assert!(inbox.has_external_clock());
+        assert_eq!((host.monotonic(), host.wall_clock()), (0, 0));
+        inbox.set_time(5_000);
+        let thread = std::thread::spawn(move || {
+            for time in (0..=100).map(|step| 5_000 + step * 10) {
+                inbox.set_time(time);
+                std::thread::yield_now();
+            }
+            inbox
+        });
+        while host.monotonic() < 1_000 {
+            assert_eq!(host.wait(Some(1_000), Awaited::default()), Wake::Time);
+        }
+        assert_eq!((host.monotonic(), host.wall_clock()), (1_000, 6_000));
+        let inbox = thread.join().expect("it does not panic");
+        assert!(!inbox.is_rung(), "the machine is left alone");
+        assert_eq!(host.wait(None, Awaited::default()), Wake::Never);
+        inbox.put(Incoming::Stop);
+        assert_eq!(host.wait(Some(2_000), Awaited::default()), Wake::Arrival);
+        assert_eq!(host.poll(1).len(), 1);
+        // A signal that ends the run has time pass.
+        inbox.put(Incoming::Signal(super::super::ProcessSignal::Terminate));
+        assert_eq!(host.poll(2).len(), 1);
+        assert_eq!(host.wait(Some(1_000_000), Awaited::default()), Wake::Time);
+        assert!(host.monotonic() >= 1_000_000);
     }
 
     #[test]

@@ -19,7 +19,11 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
 /// Returns the functions of `:time`.
 pub(crate) fn clock_rows(inbox: &Inbox) -> HostRows {
     let mut rows = HostRows::new(inbox);
-    rows.at_once("%TIME-NOW", [], "Returns the seconds since 1970, UTC.", || {
+    let inbox = inbox.clone();
+    rows.at_once("%TIME-NOW", [], "Returns the seconds since 1970, UTC.", move || {
+        if let Some(told) = inbox.told_time() {
+            return Ok(told as f64 / 1e9);
+        }
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
         Ok(since.map_or_else(|before| -before.duration().as_secs_f64(), |after| after.as_secs_f64()))
     });
