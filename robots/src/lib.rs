@@ -25,8 +25,13 @@ pub const MODULES: &[HostModule] = &[
     HostModule { name: "ros", text: include_str!("../modules/ros.esl"), rows: ros::rows },
     HostModule { name: "ros-actions", text: include_str!("../modules/ros-actions.esl"), rows: none },
     HostModule { name: "ros-bags", text: include_str!("../modules/ros-bags.esl"), rows: none },
+    HostModule { name: "ros-clock", text: include_str!("../modules/ros-clock.esl"), rows: none },
+    HostModule { name: "ros-diagnostics", text: include_str!("../modules/ros-diagnostics.esl"), rows: none },
+    HostModule { name: "ros-geometry", text: include_str!("../modules/ros-geometry.esl"), rows: none },
     HostModule { name: "ros-graph", text: include_str!("../modules/ros-graph.esl"), rows: none },
+    HostModule { name: "ros-lifecycle", text: include_str!("../modules/ros-lifecycle.esl"), rows: none },
     HostModule { name: "ros-node", text: include_str!("../modules/ros-node.esl"), rows: none },
+    HostModule { name: "ros-transforms", text: include_str!("../modules/ros-transforms.esl"), rows: none },
     HostModule { name: "ros-worlds", text: include_str!("../modules/ros-worlds.esl"), rows: none },
     HostModule { name: "zenoh", text: include_str!("../modules/zenoh.esl"), rows: self::zenoh::rows },
 ];

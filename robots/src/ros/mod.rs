@@ -11,6 +11,7 @@ use esl_host::{HostFailure, HostHandle, HostInput, HostRows, Inbox, IntoDatum, R
 use esl_world::{ready_soon, spawned};
 
 mod attachment;
+mod clock;
 mod graph;
 mod node;
 mod qos;
@@ -39,6 +40,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     add_nodes(&mut rows);
     add_topics(&mut rows, &types);
     add_services(&mut rows, &types);
+    add_clock(&mut rows, &types, inbox);
     rows
 }
 
@@ -239,6 +241,31 @@ fn add_topics(rows: &mut HostRows, types: &Types) {
             let (number, of_type) = (made, types::message(&known, &of_type));
             async move {
                 let entity = topic::subscribe(&node, input, name, of_type?, qos).await?;
+                Ok(HostHandle::new(number, entity))
+            }
+        },
+    );
+}
+
+/// Adds the functions of time.
+fn add_clock(rows: &mut HostRows, types: &Types, inbox: &Inbox) {
+    let host = inbox.clone();
+    rows.at_once("%ROS-GOES-BY-CLOCK", [], "Returns whether time is that of the topic /clock.", move || {
+        Ok(host.has_external_clock())
+    })
+    .everywhere();
+    let (known, host, mut made) = (types.clone(), inbox.clone(), 0);
+    rows.operation(
+        spawned,
+        "%ROS-CLOCK",
+        ["node", "input", "qos"],
+        "Has time be that of the topic /clock. The input is signalled with its beginning and with steps back.",
+        move |node: HostHandle<RosNode>, input: HostInput, QosArgument(qos): QosArgument| {
+            made += 1;
+            let (number, of_type) = (made, types::message(&known, "rosgraph_msgs/msg/Clock"));
+            let inbox = host.clone();
+            async move {
+                let entity = clock::follow(&node, inbox, input, of_type?, qos).await?;
                 Ok(HostHandle::new(number, entity))
             }
         },

@@ -50,6 +50,7 @@ mod replay;
 mod reports;
 mod rights;
 mod robots;
+mod robots_tools;
 #[cfg(unix)]
 mod secured;
 #[cfg(unix)]

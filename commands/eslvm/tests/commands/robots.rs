@@ -30,7 +30,7 @@ fn path_of(name: &str) -> PathBuf {
 
 /// Returns the Python that has the packages, which are installed by the first call; nothing if they cannot
 /// be.
-fn python() -> Option<&'static Path> {
+pub(crate) fn python() -> Option<&'static Path> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
     let install = || {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("robots-venv");
@@ -57,10 +57,10 @@ fn python() -> Option<&'static Path> {
 }
 
 /// A process that ends with this.
-struct Running {
-    child: Child,
+pub(crate) struct Running {
+    pub(crate) child: Child,
     input: Option<ChildStdin>,
-    lines: Receiver<String>,
+    pub(crate) lines: Receiver<String>,
 }
 
 impl Drop for Running {
@@ -89,23 +89,35 @@ impl Running {
 
     /// Returns the next line that it prints.
     #[track_caller]
-    fn line(&self) -> String {
+    pub(crate) fn line(&self) -> String {
         self.lines.recv_timeout(LONGEST).expect("it prints a line")
     }
 
-    fn tell(&mut self, line: &str) {
+    /// Returns the next line that it prints for which `is_meant` holds.
+    #[track_caller]
+    pub(crate) fn until(&self, is_meant: impl Fn(&str) -> bool) -> String {
+        loop {
+            let line = self.line();
+            if is_meant(&line) {
+                return line;
+            }
+        }
+    }
+
+    pub(crate) fn tell(&mut self, line: &str) {
         let input = self.input.as_mut().expect("its input is open");
         writeln!(input, "{line}").and_then(|()| input.flush()).expect("it reads");
     }
 }
 
 /// Starts a program, which may use a port of the loopback and is given it. The run is recorded.
-fn start_program(folder: &Folder, text: &str, port: u16) -> Running {
+pub(crate) fn start_program(folder: &Folder, text: &str, port: u16, options: &[&str]) -> Running {
     folder.file("main.esl", text);
     let port = port.to_string();
-    let record = ["--record", "run.eslj"];
-    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", record[0], record[1], "main.esl", &port]);
-    Running::start(command.current_dir(folder.path()))
+    let mut arguments = vec!["run", "--allow-net=127.0.0.1", "--record", "run.eslj"];
+    arguments.extend(options);
+    arguments.extend(["main.esl", &port]);
+    Running::start(eslvm(&arguments).current_dir(folder.path()))
 }
 
 fn wait_for_port(port: u16) {
@@ -117,7 +129,7 @@ fn wait_for_port(port: u16) {
 }
 
 /// Starts a peer that connects to a port.
-fn start_peer(python: &Path, name: &str, port: u16) -> Running {
+pub(crate) fn start_peer(python: &Path, name: &str, port: u16) -> Running {
     wait_for_port(port);
     let mut command = Command::new(python);
     let peer = Running::start(command.arg(path_of("peers").join(name)).arg(port.to_string()));
@@ -190,9 +202,11 @@ fn a_session_reaches_nothing_without_the_right() {
 
 #[test]
 fn worlds_of_scripts_have_a_graph() {
-    let path = path_of("programs").join("worlds_test.esl");
-    let done = process::run(&mut eslvm(&["test", path.to_str().expect("the path is text")]), "");
-    assert_eq!(done.status, Some(0), "{}\n{}", done.output, done.errors);
+    for name in ["worlds_test.esl", "transforms_test.esl", "lifecycle_test.esl"] {
+        let path = path_of("programs").join(name);
+        let done = process::run(&mut eslvm(&["test", path.to_str().expect("the path is text")]), "");
+        assert_eq!(done.status, Some(0), "{}\n{}", done.output, done.errors);
+    }
 }
 
 /// A program that is a router and a node, for `peers/node.py`.
@@ -235,7 +249,7 @@ fn a_node_talks_to_a_node_in_python_both_ways() {
     let Some(python) = python() else { return };
     let folder = Folder::new("ros-talker");
     let port = free_port();
-    let mut program = start_program(&folder, TALKER, port);
+    let mut program = start_program(&folder, TALKER, port, &[]);
     let mut peer = start_peer(python, "node.py", port);
     assert_eq!(program.line(), "\"echo: hello\"");
     assert_eq!(program.line(), "(:SUM 7)");
@@ -301,7 +315,7 @@ fn a_goal_is_pursued_by_a_server_in_python_and_cancelled_when_it_is_left() {
     let Some(python) = python() else { return };
     let folder = Folder::new("ros-goals");
     let port = free_port();
-    let program = start_program(&folder, GOALS, port);
+    let program = start_program(&folder, GOALS, port, &[]);
     let peer = start_peer(python, "action_server.py", port);
     let result = "(:SEQUENCE #(0 1 1))";
     assert_eq!(program.line(), "(1 (:GOAL-REJECTED \"/fibonacci\") NIL 0)");
@@ -348,7 +362,7 @@ fn goals_of_a_client_in_python_are_pursued_cancelled_and_aborted() {
     let Some(python) = python() else { return };
     let folder = Folder::new("ros-pursuer");
     let port = free_port();
-    let program = start_program(&folder, PURSUER, port);
+    let program = start_program(&folder, PURSUER, port, &[]);
     let mut peer = start_peer(python, "action_client.py", port);
     let ask = |peer: &mut Running, line: &str, answers: &[&str]| {
         peer.tell(line);

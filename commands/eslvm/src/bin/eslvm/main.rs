@@ -82,6 +82,11 @@ fn main() -> ExitCode {
             if full {
                 trace.push("full".into());
             }
+            #[cfg(feature = "robots")]
+            if speed != 1.0 && options.clock == ClockChoice::Ros {
+                command::complain("`--speed` has no effect on the clock of ROS: leave it out");
+                return ExitCode::from(command::USAGE);
+            }
             let path = ModulePath::new([file.as_path()], &modules.library);
             let rights = options.rights.rights();
             rights.and_then(|rights| {
@@ -156,7 +161,18 @@ fn main() -> ExitCode {
         EslvmAction::Mcap { action } => eslvm::mcap::run(&action),
         EslvmAction::Repl { options, modules } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &modules.library);
-            eslvm::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
+            match options.clock {
+                ClockChoice::Real | ClockChoice::Virtual => {
+                    eslvm::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
+                }
+                #[cfg(feature = "robots")]
+                ClockChoice::Ros => {
+                    command::complain(
+                        "`--clock ros` is for `eslvm run`: the clock of a REPL is real or virtual",
+                    );
+                    Err(command::USAGE)
+                }
+            }
         }),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))

@@ -264,6 +264,10 @@ pub(crate) enum ClockChoice {
     Real,
     /// Time that stands still until all tasks wait, and then jumps to the first time that one waits for
     Virtual,
+    /// Time of the topic `/clock` of ROS, which the first node of the program subscribes to: that of a
+    /// simulator, or of a recording that is played
+    #[cfg(feature = "robots")]
+    Ros,
 }
 
 #[derive(Args)]

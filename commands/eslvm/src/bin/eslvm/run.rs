@@ -73,8 +73,11 @@ pub(crate) fn run(
     if let Some(schedule) = schedule {
         refuse_other(schedule, &program)?;
     }
-    if options.clock == ClockChoice::Virtual {
-        host = host.with_virtual_time();
+    match options.clock {
+        ClockChoice::Real => {}
+        ClockChoice::Virtual => host = host.with_virtual_time(),
+        #[cfg(feature = "robots")]
+        ClockChoice::Ros => host = host.with_external_time(),
     }
     let recording = match record {
         Some(path) => Some((FileRecorder::create(path).map_err(|error| not_written(path, &error))?, path)),
@@ -89,7 +92,7 @@ pub(crate) fn run(
     };
     let mut machine = program::machine(options.config(), host).map_err(setup)?;
     operate.prepare(&mut machine)?;
-    if options.clock == ClockChoice::Real {
+    if options.clock != ClockChoice::Virtual {
         esl_world::install_operations(&mut machine);
     }
     signals.set(machine.inbox());
