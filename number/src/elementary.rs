@@ -5,7 +5,7 @@
 use esl_heap::Value;
 
 use super::transcendental;
-use super::{NumberFailure, NumberResult, NumberStop, Numbers};
+use super::{NumberFailure, NumberResult, NumberStop, Numbers, float, power};
 
 /// A function of one double.
 #[derive(Clone, Copy, Debug)]
@@ -52,9 +52,10 @@ elementary! {
 }
 
 impl Elementary {
-    /// Applies the function to `a`.
+    /// Applies the function to `a`. A rational beyond the doubles counts as infinite, for functions that have
+    /// limits there.
     pub fn apply(&self, numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
-        let x = numbers.double_of(self.name, a, "NUMBER")?;
+        let x = numbers.nearest_double(a, "NUMBER")?;
         if !(self.domain)(x) {
             // The result is complex.
             return Err(NumberStop::Slowly);
@@ -63,12 +64,23 @@ impl Elementary {
         if y.is_infinite() && x.abs() == 1.0 {
             return numbers.fail(NumberFailure::DivisionByZero(self.name, [a, Value::small(0)]));
         }
+        if x.is_infinite() && y.is_nan() {
+            return numbers.fail(NumberFailure::FloatOverflow(self.name));
+        }
         numbers.float_value(self.name, y)
     }
 }
 
 /// Implements `(atan y x)`: the angle of the point with these coordinates.
 pub fn angle(numbers: &mut Numbers<'_>, y: Value, x: Value) -> NumberResult {
-    let (y, x) = (numbers.double_of("ATAN", y, "REAL")?, numbers.double_of("ATAN", x, "REAL")?);
-    numbers.float_value("ATAN", transcendental::atan2(y, x))
+    let (above, y) = power::parts(numbers, y, "REAL")?;
+    let (right, x) = power::parts(numbers, x, "REAL")?;
+    let angle = if above == right || y == 0.0 || x == 0.0 {
+        transcendental::atan2(y, x)
+    } else {
+        // The quotient may be a double where a coordinate is not.
+        let quotient = float::scaled((y / x).abs(), above - right);
+        transcendental::atan2(quotient.copysign(y), 1f64.copysign(x))
+    };
+    numbers.float_value("ATAN", angle)
 }

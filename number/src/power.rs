@@ -7,7 +7,7 @@ use esl_heap::Value;
 use num_traits::Pow;
 
 use super::limit::{self, BIT_LIMIT};
-use super::{Int, Number, NumberFailure, NumberResult, NumberStop, Numbers, Ratio, transcendental};
+use super::{Int, Number, NumberFailure, NumberResult, NumberStop, Numbers, Ratio, float, transcendental};
 
 /// Implements `(expt base power)`.
 pub fn expt(numbers: &mut Numbers<'_>, base: Value, power: Value) -> NumberResult {
@@ -32,13 +32,51 @@ pub fn expt(numbers: &mut Numbers<'_>, base: Value, power: Value) -> NumberResul
             let result = Ratio { numerator, denominator };
             numbers.ratio_value("EXPT", &if y.is_negative() { result.inverted() } else { result })
         }
+        (Number::Float(x), Number::Int(y)) if !y.to_f64().is_finite() => {
+            // The power has a limit unless it grows beyond the doubles.
+            if x == 0.0 && y.is_negative() {
+                return numbers.fail(NumberFailure::DivisionByZero("EXPT", [base, power]));
+            }
+            let magnitude = transcendental::pow(x.abs(), y.to_f64());
+            let is_negative = x.is_sign_negative() && y.is_odd();
+            numbers.float_value("EXPT", if is_negative { -magnitude } else { magnitude })
+        }
         (_, y) => {
-            let x = numbers.double_of("EXPT", base, "NUMBER")?;
+            let (bits, x) = parts(numbers, base, "NUMBER")?;
             let is_float = matches!(y, Number::Float(_));
+            let sign = super::sign(numbers, power, "NUMBER")?;
             let y = numbers.double_of("EXPT", power, "NUMBER")?;
-            real_power(numbers, [base, power], is_float, x, y)
+            if y == 0.0 && sign != 0 && x == 0.0 {
+                // The power is too small for a double, and is not zero.
+                return real_power(numbers, [base, power], is_float, x, f64::from(sign));
+            }
+            if bits == 0 {
+                return real_power(numbers, [base, power], is_float, x, y);
+            }
+            if x < 0.0 && y.fract() != 0.0 {
+                return Err(NumberStop::Slowly);
+            }
+            let exponent = y * bits as f64;
+            let power = transcendental::pow(x, y) * transcendental::pow(2.0, exponent.fract());
+            numbers.float_value("EXPT", float::scaled(power, exponent.trunc() as i64))
         }
     }
+}
+
+/// Returns a real number as `(bits, x)`, meaning `x · 2^bits`; `bits` is 0 unless the number is beyond the
+/// doubles.
+pub(crate) fn parts(numbers: &mut Numbers<'_>, v: Value, expected: &'static str) -> NumberResult<(i64, f64)> {
+    if let Some(x) = v.as_double().or_else(|| v.as_fixnum().map(|n| n as f64)) {
+        return Ok((0, x));
+    }
+    let ratio = match numbers.number(v, expected)? {
+        Number::Float(x) => return Ok((0, x)),
+        Number::Int(n) => Ratio::integer(n),
+        Number::Ratio(r) => r,
+    };
+    let is_negative = ratio.numerator.is_negative();
+    let (bits, x) = scaled(&Ratio { numerator: ratio.numerator.abs(), denominator: ratio.denominator });
+    Ok((bits as i64, if is_negative { -x } else { x }))
 }
 
 /// Returns an integer to the power of an exponent that is not negative. 0 to the power of 0 is 1.
@@ -102,11 +140,16 @@ fn real_power(
 
 /// Implements `(sqrt a)`.
 pub fn sqrt(numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
-    let x = numbers.double_of("SQRT", a, "NUMBER")?;
+    let (bits, x) = parts(numbers, a, "NUMBER")?;
     if x < 0.0 {
         return Err(NumberStop::Slowly);
     }
-    numbers.float_value("SQRT", x.sqrt())
+    if bits == 0 {
+        return numbers.float_value("SQRT", x.sqrt());
+    }
+    // The exponent is halved, so it must be even.
+    let (half, odd) = (bits.div_euclid(2), bits.rem_euclid(2));
+    numbers.float_value("SQRT", float::scaled(float::scaled(x, odd).sqrt(), half))
 }
 
 /// Implements `(isqrt a)`: the greatest integer whose square is at most `a`.
@@ -129,7 +172,7 @@ pub fn isqrt(numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
 
 /// Implements `(exp a)`.
 pub fn exp(numbers: &mut Numbers<'_>, a: Value) -> NumberResult {
-    let x = numbers.double_of("EXP", a, "NUMBER")?;
+    let x = numbers.nearest_double(a, "NUMBER")?;
     numbers.float_value("EXP", transcendental::exp(x))
 }
 
