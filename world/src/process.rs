@@ -2,6 +2,9 @@
 //!
 //! A program that is run is stopped when its call is left: by SIGTERM, and by SIGKILL if it has not ended
 //! within [`GRACE`]. The call is over when the program is.
+//!
+//! Each program is the leader of a process group of its own, and signals go to the group: the programs that
+//! it has started end with it, unless they have left the group.
 
 use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
@@ -200,7 +203,7 @@ fn command(
     let mut command = Command::new(find_program(name).ok_or_else(unknown)?);
     // The program sees the name under which it was called as argument 0, not the path that was found.
     #[cfg(unix)]
-    command.arg0(name);
+    command.arg0(name).process_group(0);
     command.args(arguments).envs(environment);
     if let Some(directory) = directory {
         command.current_dir(directory);
@@ -242,6 +245,7 @@ async fn run(
 ) -> Result<(Datum, Datum, i32), HostFailure> {
     command.stdin(pipe_if(input.is_some())).stdout(pipe_if(wants_output)).stderr(pipe_if(wants_errors));
     let mut child = start(command, &name)?;
+    let group = ProcessGroup::of(&child);
     let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
     let feed = async move {
         if let (Some(mut stdin), Some(input)) = (stdin, input) {
@@ -261,7 +265,7 @@ async fn run(
         answer = work => answer,
     };
     if answer.is_err() {
-        stop(&mut child).await;
+        stop(&mut child, group).await;
     }
     answer
 }
@@ -279,29 +283,83 @@ async fn text_from(pipe: Option<impl AsyncRead + Unpin>) -> Result<Datum, HostFa
     Ok(String::from_utf8_lossy(&bytes).as_ref().into_datum())
 }
 
-/// Ends a program, and waits until it has ended.
-async fn stop(child: &mut Child) {
-    terminate(child);
-    if tokio::time::timeout(GRACE, child.wait()).await.is_err() {
-        // It has ended meanwhile, or now does.
-        drop(child.start_kill());
+/// Ends a program and those that it has started, and waits until they have ended.
+async fn stop(child: &mut Child, group: ProcessGroup) {
+    group.ask_to_end(child);
+    let end = async {
         drop(child.wait().await);
+        group.wait().await;
+    };
+    if tokio::time::timeout(GRACE, end).await.is_err() {
+        group.kill(child);
+        drop(child.wait().await);
+        group.wait_after_kill().await;
     }
 }
 
-/// Sends SIGTERM to a program that has not been waited for.
+/// The process group of a program.
+#[derive(Clone, Copy)]
+struct ProcessGroup {
+    #[cfg(unix)]
+    leader: Option<rustix::process::Pid>,
+}
+
 #[cfg(unix)]
-fn terminate(child: &mut Child) {
-    let number = child.id().and_then(|id| i32::try_from(id).ok());
-    if let Some(process) = number.and_then(rustix::process::Pid::from_raw) {
-        // It may have ended by itself.
-        _ = rustix::process::kill_process(process, rustix::process::Signal::TERM);
+impl ProcessGroup {
+    fn of(child: &Child) -> ProcessGroup {
+        let number = child.id().and_then(|id| i32::try_from(id).ok());
+        ProcessGroup { leader: number.and_then(rustix::process::Pid::from_raw) }
+    }
+
+    /// Sends SIGTERM. A program that has ended does not hear it.
+    fn ask_to_end(self, _: &mut Child) {
+        self.send(rustix::process::Signal::TERM);
+    }
+
+    /// Sends SIGKILL.
+    fn kill(self, _: &mut Child) {
+        self.send(rustix::process::Signal::KILL);
+    }
+
+    fn send(self, signal: rustix::process::Signal) {
+        if let Some(leader) = self.leader {
+            _ = rustix::process::kill_process_group(leader, signal);
+        }
+    }
+
+    /// Waits until no process is left. The system does not report that, so it is asked again.
+    async fn wait(self) {
+        let mut pause = Duration::from_millis(1);
+        while self.leader.is_some_and(|leader| rustix::process::test_kill_process_group(leader).is_ok()) {
+            tokio::time::sleep(pause).await;
+            pause = (pause * 2).min(Duration::from_millis(50));
+        }
+    }
+}
+
+impl ProcessGroup {
+    /// Waits until the processes have gone that were killed. A system whose first process does not take note
+    /// of their end keeps their numbers.
+    async fn wait_after_kill(self) {
+        drop(tokio::time::timeout(GRACE / 10, self.wait()).await);
     }
 }
 
 #[cfg(not(unix))]
-fn terminate(child: &mut Child) {
-    drop(child.start_kill());
+impl ProcessGroup {
+    fn of(_: &Child) -> ProcessGroup {
+        ProcessGroup {}
+    }
+
+    fn ask_to_end(self, child: &mut Child) {
+        drop(child.start_kill());
+    }
+
+    fn kill(self, child: &mut Child) {
+        drop(child.start_kill());
+    }
+
+    async fn wait(self) {}
 }
 
 /// Launches a program. Returns the number that the system has for it.
@@ -322,18 +380,27 @@ fn launch(
     output.take(child.stdout.take());
     errors.take(child.stderr.take());
     let number = child.id().unwrap_or(0);
+    let group = ProcessGroup::of(&child);
     let (status_sender, status) = watch::channel(None);
     let (end, mut ends) = mpsc::unbounded_channel();
     let watch = async move {
+        let mut is_asked = false;
         let status = loop {
             tokio::select! {
                 status = child.wait() => break status,
                 Some(end) = ends.recv() => match end {
-                    StopRequest::Politely => terminate(&mut child),
-                    StopRequest::AtOnce => drop(child.start_kill()),
+                    StopRequest::Politely => {
+                        is_asked = true;
+                        group.ask_to_end(&mut child);
+                    }
+                    StopRequest::AtOnce => group.kill(&mut child),
                 },
             }
         };
+        if is_asked && tokio::time::timeout(GRACE, group.wait()).await.is_err() {
+            group.kill(&mut child);
+            group.wait_after_kill().await;
+        }
         // The receivers may be gone.
         _ = status_sender.send(Some(status.map_or(-1, status_number)));
     };

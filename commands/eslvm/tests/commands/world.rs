@@ -84,6 +84,37 @@ fn a_program_whose_call_is_left_is_ended_and_others_go_on() {
 
 #[cfg(unix)]
 #[test]
+fn a_program_ends_with_those_that_it_has_started() {
+    // The first two start a program in the background that outlives its parent unless it is ended too; the
+    // second one ignores SIGTERM. The third one is left when its output has an end, and the last one is
+    // launched.
+    let text = "(require :process)
+(defun lives (file)
+  (with-open-file (s file)
+    (zerop (nth-value 2 (process:run-program (list \"sh\" \"-c\" (format nil \"case $(sed 's/.*) //;s/ .*//' /proc/~a/stat 2> nothing) in ''|Z) exit 1;; esac\" (read-line s))))))))
+(defun await (file)
+  (loop until (probe-file file) do (sleep 0.01)))
+(defun script (trap file rest)
+  (format nil \"sh -c '~a echo $$ > ~a.tmp; mv ~:*~a.tmp ~:*~a; while :; do sleep 0.02; done' & ~a\" trap file rest))
+(dolist (trap '(\"\" \"trap : TERM;\"))
+  (let* ((file (if (equal trap \"\") \"plain\" \"stubborn\"))
+         (task (spawn (process:run-program (list \"sh\" \"-c\" (script trap file \"wait\"))))))
+    (await file)
+    (let ((before (lives file)))
+      (abort-task task)
+      (print (list before (wait-for-task task) (lives file))))))
+(print (or-parallel (a (process:run-program (list \"sh\" \"-c\" (script \"\" \"orphan\" \"exit\")) :output :string))
+                    (b (await \"orphan\") 'first)))
+(print (lives \"orphan\"))
+(let ((p (process:launch-program (list \"sh\" \"-c\" (script \"\" \"launched\" \"wait\")))))
+  (await \"launched\")
+  (print (list (lives \"launched\") (process:end-process p) (lives \"launched\"))))";
+    let expected = ["(T :ABORTED NIL)", "(T :ABORTED NIL)", "FIRST", "NIL", "(T 143 NIL)"];
+    check("process-group", text, &["--allow-run=sh"], &expected);
+}
+
+#[cfg(unix)]
+#[test]
 fn programs_have_the_environment_that_there_is_and_what_is_added() {
     let text = "(require :process)
 (defvar *command* '(\"sh\" \"-c\" \"echo $ESL_GIVEN $ESL_ADDED; pwd -P | sed 's,.*/,,'\"))
