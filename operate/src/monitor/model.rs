@@ -274,6 +274,7 @@ fn failure(row: &FailureRow) -> Value {
     json!({
         "n": row.number, "time": row.time as f64 / 1e9, "task": row.task, "name": row.name,
         "cause": row.cause, "arguments": row.arguments, "place": row.place, "report": row.report,
+        "full": row.full_report,
     })
 }
 

@@ -225,6 +225,17 @@ fn the_page_is_readable_at_any_width_and_keeps_the_end_of_the_run() {
         .until("$('alarm').textContent.startsWith('The run has ended with status 1: a failure or an abort')");
     browser.until("$('alarm').textContent.includes('A failure of cause :WHEEL-STUCK with 9, LEFT.')");
     browser.until("$('t-failures').textContent.includes('it has ended the task')");
+    // The calls of the library are shown if they are wanted.
+    browser.until("!$('library').checked && !$('t-failures').textContent.includes('ESL::%')");
+    browser.value("$('library').focus(), $('library').click(), true");
+    browser.until(
+        "$('t-failures').textContent.includes('in ESL::%') && document.activeElement.id === 'library'",
+    );
+    for width in [420, 1400] {
+        browser.resize(width);
+        browser.until(&format!("innerWidth === {width}"));
+        browser.until(ALIGNED);
+    }
     assert_eq!(run.end(), Some(1));
     // It stays so when the run cannot be reached any more.
     std::thread::sleep(std::time::Duration::from_millis(300));
