@@ -1315,7 +1315,7 @@ macro_rules! for_each_builtin {
             /// Records that the function `name` reads slot `slot` of the class named `class`. Comes after the
             /// function.
             DefineAccessor = class::define_accessor, internal "%DEFINE-ACCESSOR"
-                ("name class slot read-only") shares own;
+                ("name class slot access") shares own;
 
             // ---- instances of the classes of DEFCLASS
             /// A fresh instance of a class, with a layout and a simple vector of the values of its slots.

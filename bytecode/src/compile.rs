@@ -56,8 +56,19 @@ pub struct Accessor {
     pub class: Symbol,
     /// Number of the slot, from 0.
     pub slot: u16,
-    /// Whether it may not be set.
-    pub read_only: bool,
+    /// How it may be set.
+    pub access: SlotAccess,
+}
+
+/// How the slot of a structure may be set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SlotAccess {
+    /// To any object.
+    Free,
+    /// To objects of its type: by the macro `%set-checked-slot`.
+    Checked,
+    /// Not at all.
+    ReadOnly,
 }
 
 /// All that is known of a symbol globally when a form is compiled.
@@ -121,6 +132,10 @@ pub trait Environment {
     }
     /// Returns a number for a fresh uninterned symbol of this compilation unit.
     fn fresh(&mut self) -> u32;
+    /// Returns whether `symbol` names a type.
+    fn is_type(&self, _symbol: &Symbol) -> bool {
+        true
+    }
     /// Names like `symbol` that are defined for such a use; the likeliest first.
     fn similar(&self, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol>;
     /// Returns the parameters of the global function or macro in `cell`, if they are known; `cell` is its

@@ -12,6 +12,8 @@ pub enum NameUse {
     Variable,
     /// As a cause of failures.
     Cause,
+    /// As a type.
+    Type,
 }
 
 /// Parameters of a function or macro, to check calls of it.

@@ -353,6 +353,11 @@ UNDEFINED_VARIABLE = "undefined-variable" Warning
     fails: "(defun area (width)\n  (* width heigth))\n"
     repaired: "(defun area (width height)\n  (* width height))\n"
 
+UNKNOWN_TYPE = "unknown-type" Warning
+    /// A name that is used as a type and denotes none.
+    fails: "(defun next (n)\n  (check-type n intger)\n  (+ n 1))\n"
+    repaired: "(defun next (n)\n  (check-type n integer)\n  (+ n 1))\n"
+
 WRONG_ARGUMENT_COUNT = "wrong-argument-count" Warning
     /// A call with more or fewer arguments than the function takes.
     fails: "(defun area (width height)\n  (* width height))\n(print (area 3))\n"

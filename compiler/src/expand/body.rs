@@ -79,6 +79,10 @@ impl Expander {
                     }
                 }
             }
+        } else if symbol.is_cl("TYPE") {
+            if let Some(specifier) = names.first() {
+                self.note_declared(specifier, form, origin);
+            }
         } else if symbol.is_cl("INLINE") || symbol.is_cl("NOTINLINE") {
             let is_written = symbol.is_cl("NOTINLINE");
             let functions = names.iter().filter_map(|name| name.as_symbol());

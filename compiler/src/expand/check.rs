@@ -1,6 +1,6 @@
 //! Checks of forms as they are written, before macros of the library take them apart: format directives
-//! against arguments, forms without a body, tests given to `assert`, and the arguments of failures and of
-//! their procedures; and keywords of local functions.
+//! against arguments, forms without a body, tests given to `assert`, the arguments of failures and of their
+//! procedures, and names of types; and keywords of local functions.
 //!
 //! Only names of the language are checked, so what they mean is known. A form that a macro of the library
 //! makes is not checked.
@@ -22,6 +22,7 @@ use super::global::CauseArguments;
 use super::operation_check;
 use super::origin::OriginId;
 use super::trap::traps;
+use super::type_use::{definition, handled_types, types};
 use crate::diagnostic::code;
 use crate::similar::is_like;
 
@@ -33,11 +34,33 @@ static CHECKS: LazyLock<FxHashMap<Symbol, FormCheck>> = LazyLock::new(|| {
         ("CASE", case),
         ("ECASE", case),
         ("CERROR", |expander, _, form, origin| expander.directives(form, 1, origin)),
-        ("ERROR", |expander, _, form, origin| expander.directives(form, 0, origin)),
-        ("WARN", |expander, _, form, origin| expander.directives(form, 0, origin)),
+        ("CHECK-TYPE", types),
+        ("COERCE", types),
+        ("CONCATENATE", types),
+        ("CTYPECASE", types),
+        ("DEFCLASS", definition),
+        ("DEFINE-CONDITION", definition),
+        ("DEFMETHOD", types),
+        ("DEFSTRUCT", definition),
+        ("DEFTYPE", definition),
+        ("ERROR", error),
+        ("ETYPECASE", types),
+        ("FIND-CLASS", definition),
         ("FORMAT", format),
-        ("HANDLER-BIND", guard),
-        ("HANDLER-CASE", guard),
+        ("HANDLER-BIND", handler),
+        ("HANDLER-CASE", handler),
+        ("MAKE-ARRAY", types),
+        ("MAKE-CONDITION", types),
+        ("MAKE-INSTANCE", types),
+        ("MAKE-SEQUENCE", types),
+        ("MAKE-STRING", types),
+        ("MAP", types),
+        ("MERGE", types),
+        ("SIGNAL", types),
+        ("SUBTYPEP", types),
+        ("TYPECASE", types),
+        ("TYPEP", types),
+        ("WARN", error),
         ("IGNORE-ERRORS", guard),
         ("RESTART-CASE", guard),
     ];
@@ -217,6 +240,18 @@ fn recovery(expander: &mut Expander, environment: &dyn Environment, form: &Form,
             expander.globals.note_procedure(cause, named);
         }
     }
+}
+
+/// `(error control argument*)`, `(error 'type argument*)`
+fn error(expander: &mut Expander, environment: &dyn Environment, form: &Form, origin: Option<OriginId>) {
+    expander.directives(form, 0, origin);
+    types(expander, environment, form, origin);
+}
+
+/// A form that handles failures of some types.
+fn handler(expander: &mut Expander, environment: &dyn Environment, form: &Form, origin: Option<OriginId>) {
+    handled_types(expander, form, origin);
+    guard(expander, environment, form, origin);
 }
 
 /// A form that handles failures.

@@ -74,6 +74,7 @@ pub(super) fn progn(expander: &mut Expander, _: &mut dyn Environment, form: Form
 /// `(the type form)`
 pub(super) fn the(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(2..=2, "takes a type and a form")?;
+    expander.note_declared(&form.args[0], &form, to.origin);
     expander.schedule([Job::Expand(form.args[1].clone(), to)]);
     Ok(())
 }

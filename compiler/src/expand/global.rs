@@ -78,6 +78,10 @@ pub(super) struct GlobalUses {
     pub(super) operations: UnitOperations,
     /// Causes, goals and the like that top-level forms define, by source, kind and name, and their places.
     pub(super) definitions: FxHashMap<(SourceId, &'static str, String), Span>,
+    /// Names that the unit uses as types.
+    pub(super) types: Vec<(Symbol, NameUsed)>,
+    /// Names that forms of the unit define as types.
+    pub(super) defined_types: FxHashSet<Symbol>,
     /// Functions that the unit defines; `None` if several definitions differ in the number of arguments.
     pub(super) functions: FxHashMap<FunctionName, Option<Box<DefinedFunction>>>,
     /// Macros that the unit defines, and the places of their names.

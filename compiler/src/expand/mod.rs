@@ -113,6 +113,7 @@ mod standard_place;
 mod toplevel;
 mod trap;
 mod twice;
+mod type_use;
 mod unit;
 mod values;
 mod variable;

@@ -9,7 +9,7 @@
 //! `(setf f)`, which takes the new value first.
 
 use esl_bytecode::builtin::Builtin;
-use esl_bytecode::compile::{Accessor, Environment, GlobalFunction, MacroRef};
+use esl_bytecode::compile::{Accessor, Environment, GlobalFunction, MacroRef, SlotAccess};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
@@ -185,18 +185,23 @@ impl Expander {
         form: Form,
         to: To,
     ) -> Checked {
-        if accessor.read_only {
+        if accessor.access == SlotAccess::ReadOnly {
             let message =
                 format!("the slot that {} reads is read-only and cannot be set", name(&form.operator));
             return Err(Box::new(code::READ_ONLY_SLOT.at(form.head(), message)));
         }
         let make = Make(to.span);
-        let prefix = vec![
-            make.symbol(&Symbol::esl("%CALL-GLOBAL")),
-            make.symbol(&Symbol::esl("%SET-SLOT")),
-            make.quote(make.symbol(&accessor.class)),
-            Datum::integer(accessor.slot, to.span),
-        ];
+        let prefix = match accessor.access {
+            SlotAccess::Checked => {
+                vec![make.symbol(&Symbol::esl("%SET-CHECKED-SLOT")), make.symbol(&form.operator)]
+            }
+            _ => vec![
+                make.symbol(&Symbol::esl("%CALL-GLOBAL")),
+                make.symbol(&Symbol::esl("%SET-SLOT")),
+                make.quote(make.symbol(&accessor.class)),
+                Datum::integer(accessor.slot, to.span),
+            ],
+        };
         self.update_place(environment, prefix, form, usize::MAX, to);
         Ok(())
     }

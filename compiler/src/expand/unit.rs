@@ -1,5 +1,5 @@
-//! Findings at the end of a compilation unit: undefined functions and variables, undeclared causes, and calls
-//! whose arguments do not fit the function.
+//! Findings at the end of a compilation unit: undefined functions and variables, undeclared causes, unknown
+//! types, and calls whose arguments do not fit the function.
 
 use esl_bytecode::compile::{Arity, Environment, GlobalFunction, GlobalVariable, NameUse};
 use esl_bytecode::datum::Datum;
@@ -124,6 +124,10 @@ impl GlobalUses {
                 findings.foreign.push(uses[0].span);
             }
             findings.diagnostics.push(self.with_maker(warning, &uses[0]));
+        }
+        for (symbol, places) in self.take_unknown_types(environment) {
+            let warning = similar.unknown_type(&symbol, &places);
+            findings.diagnostics.push(self.with_maker(warning, &places[0]));
         }
         self.undefined_variables(similar, &mut findings.diagnostics);
         findings
@@ -415,6 +419,12 @@ impl Similar<'_> {
             return diagnostic.help(help);
         }
         self.help(diagnostic, &function.symbol, NameUse::Function)
+    }
+
+    fn unknown_type(&mut self, symbol: &Symbol, uses: &[NameUsed]) -> Diagnostic {
+        let message = format!("no type is called {}", name(symbol));
+        let warning = with_uses(code::UNKNOWN_TYPE.at(uses[0].span, message), &uses[1..]);
+        self.help(warning, symbol, NameUse::Type)
     }
 
     /// The warning about an undeclared cause, if the program declares causes at all.

@@ -264,6 +264,7 @@ fn the_programs_in_the_table_of_codes_have_them() {
         "unreachable-clause",
         "nothing-to-wait-for",
         "undeclared-cause",
+        "unknown-type",
         "expansion-too-large",
         "outside-clause",
         "unknown-module",

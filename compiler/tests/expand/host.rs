@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use esl_bytecode::compile::{
     Accessor, Arity, CompileTimeFailure, CompileTimeHost, Environment, Global, GlobalFunction,
-    GlobalVariable, InternError, MacroCall, MacroRef, NameUse, SourcePlace,
+    GlobalVariable, InternError, MacroCall, MacroRef, NameUse, SlotAccess, SourcePlace,
 };
 use esl_bytecode::datum::{Datum, ObjectId};
 use esl_bytecode::module::{Constant, Module};
@@ -74,11 +74,11 @@ impl FakeHost {
         let pi = Datum::integer(3, Span::default());
         let limit = host.symbol("limit");
         host.globals.entry(limit).or_default().variable = GlobalVariable::Constant(pi);
-        let accessor = Accessor { class: host.symbol("point"), slot: 1, read_only: false };
+        let accessor = Accessor { class: host.symbol("point"), slot: 1, access: SlotAccess::Free };
         let point_y = host.symbol("point-y");
         host.function("point-y", 1, Some(1));
         host.globals.entry(point_y).or_default().accessor = Some(accessor);
-        let fixed = Accessor { class: host.symbol("point"), slot: 0, read_only: true };
+        let fixed = Accessor { class: host.symbol("point"), slot: 0, access: SlotAccess::ReadOnly };
         let point_x = host.symbol("point-x");
         host.globals.entry(point_x).or_default().accessor = Some(fixed);
         for (name, template) in [("improvable", "(f #1)"), ("good-enough", "#0")] {
@@ -198,7 +198,7 @@ impl Environment for FakeHost {
             let is_defined = match wanted {
                 NameUse::Variable => !matches!(global.variable, GlobalVariable::Undefined),
                 NameUse::Function => global.function != GlobalFunction::Undefined,
-                NameUse::Cause => false,
+                NameUse::Cause | NameUse::Type => false,
             };
             is_defined && *other != symbol && other.name().get(..2) == symbol.name().get(..2)
         };

@@ -196,13 +196,13 @@ pub(super) fn structurep(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn define_accessor(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [name, class, index, read_only] = exactly(arguments);
+    let [name, class, index, access] = exactly(arguments);
     definable(vm, name, "function")?;
     if !vm.heap.is(class, Kind::Symbol) {
         return vm.exchange.type_error(class, "SYMBOL");
     }
     vm.exchange.index_below(index, usize::from(u16::MAX))?;
-    let record = vm.heap.cons(index, read_only)?;
+    let record = vm.heap.cons(index, access)?;
     let record = vm.heap.cons(class, record)?;
     let indicator = vm.names.known.accessor;
     super::symbol::put(vm, &[name, indicator, record])?;

@@ -11,7 +11,7 @@ use crate::builtins::symbol::{designated_text, text_of};
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Kind};
 use crate::names::Names;
-use crate::raise::{Exit, Outcome, Raised};
+use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -35,9 +35,23 @@ fn designated_package(vm: &mut Vm, v: Value) -> Result<PackageId, Exit> {
     }
 }
 
+/// Returns the current package.
+///
+/// # Errors
+/// A failure if the value of `*package*` is not a package.
+pub(super) fn current(vm: &mut Vm) -> Result<PackageId, Exit> {
+    let variable = vm.names.known.package;
+    match vm.symbol_value(variable) {
+        Some(value) if vm.names.package_of(&vm.heap, value).is_none() => {
+            vm.exchange.raise(Raised::Variable(variable, value, Expected::Type("PACKAGE")))
+        }
+        _ => Ok(vm.current_package()),
+    }
+}
+
 /// Returns the package of an optional argument: the current one if it was left out.
 fn package_or_current(vm: &mut Vm, v: Value) -> Result<PackageId, Exit> {
-    if v.is_nil() { Ok(vm.current_package()) } else { designated_package(vm, v) }
+    if v.is_nil() { current(vm) } else { designated_package(vm, v) }
 }
 
 /// Returns the packages of a designator or a list of designators.
@@ -286,6 +300,7 @@ fn list_of_symbols(vm: &mut Vm, symbols: &[Symbol]) -> Outcome {
 }
 
 pub(super) fn symbol_qualifier(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    current(vm)?;
     match qualifier(vm, arguments[0]) {
         None => vm.exchange.type_error(arguments[0], "SYMBOL"),
         Some(Qualifier::None) => Ok(Value::NIL),

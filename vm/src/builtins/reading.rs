@@ -11,11 +11,9 @@ use crate::builtins::symbol::text_between;
 use crate::datum::Unit;
 use crate::environment;
 use crate::equality::characters_of;
-use crate::raise::{Exit, Outcome, Raised};
+use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
-
-use super::integer::radix;
 
 /// Number of characters in which the next datum of a text is looked for at first; twice as many whenever it
 /// may go on after them. So reading all data of a text takes time in proportion to its length.
@@ -33,8 +31,12 @@ pub(super) fn read_datum(
     start: usize,
     name: Option<&str>,
 ) -> Result<ReadOutcome, Exit> {
-    if let Some(base) = vm.symbol_value(vm.names.known.read_base) {
-        radix(vm, base)?;
+    super::package::current(vm)?;
+    let variable = vm.names.known.read_base;
+    if let Some(base) = vm.symbol_value(variable)
+        && !matches!(base.as_index(), Some(2..=36))
+    {
+        return vm.exchange.raise(Raised::Variable(variable, base, Expected::Written("(INTEGER 2 36)")));
     }
     vm.names.check_room(&mut vm.heap)?;
     let read = environment::with_compiler(vm, |vm, compiler| {

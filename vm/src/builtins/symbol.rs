@@ -10,7 +10,7 @@ use crate::environment;
 use crate::equality::characters_of;
 use crate::heap::layout::SymbolObject;
 use crate::heap::{Heap, Kind};
-use crate::raise::{Exit, Outcome, Raised};
+use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -241,7 +241,10 @@ pub(super) fn gensym(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let number = match vm.symbol_value(counter) {
         None => Value::small(1),
         Some(value) if value.as_index().is_some() => value,
-        Some(other) => return vm.exchange.type_error(other, "UNSIGNED-BYTE"),
+        Some(other) => {
+            let expected = Expected::Type("UNSIGNED-BYTE");
+            return vm.exchange.raise(Raised::Variable(counter, other, expected));
+        }
     };
     let symbol = named_symbol(vm, &prefix, number)?;
     let next = number.as_fixnum().and_then(|n| Value::fixnum(n + 1)).unwrap_or(Value::small(0));

@@ -9,6 +9,7 @@
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::compile::{
     Accessor, Arity, Environment, Global, GlobalFunction, GlobalVariable, InternError, NameUse, Signature,
+    SlotAccess,
 };
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
 use esl_bytecode::module::Parameters;
@@ -109,6 +110,10 @@ impl Environment for Vm {
 
     fn fresh(&mut self) -> u32 {
         self.names.fresh()
+    }
+
+    fn is_type(&self, symbol: &Symbol) -> bool {
+        similar::is_type(self, symbol)
     }
 
     fn similar(&self, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol> {
@@ -247,7 +252,11 @@ fn accessor_info(vm: &Vm, object: Value) -> Option<Accessor> {
     Some(Accessor {
         class: vm.names.name_of(&vm.heap, class.car)?,
         slot: u16::try_from(slot.car.as_index()?).ok()?,
-        read_only: slot.cdr.is_true(),
+        access: match slot.cdr {
+            Value::NIL => SlotAccess::Free,
+            access if access.is_cons() => SlotAccess::Checked,
+            _ => SlotAccess::ReadOnly,
+        },
     })
 }
 

@@ -1,7 +1,7 @@
 //! Suggestions for misspelt names.
 
 use esl_bytecode::builtin::BUILTINS;
-use esl_bytecode::compile::NameUse;
+use esl_bytecode::compile::{Environment, GlobalVariable, NameUse};
 use esl_bytecode::package::{PackageId, Qualifier};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
@@ -51,6 +51,14 @@ pub(super) fn similar(vm: &Vm, symbol: &Symbol, wanted: NameUse) -> Vec<Symbol> 
         }
         vm.names.images.each_definition(&mut consider);
     }
+    if wanted == NameUse::Type {
+        standard_types(vm).iter().for_each(&mut consider);
+        vm.names.images.each_definition(&mut |symbol: &Symbol| {
+            if is_class_of_image(vm, symbol) || is_defined_type(vm, symbol) {
+                consider(symbol);
+            }
+        });
+    }
     // At equal distance, the program's own names come first, then in alphabetical order.
     found.sort_by_key(|(distance, candidate)| {
         let is_foreign = candidate.package() != symbol.package();
@@ -65,6 +73,44 @@ fn is_visible(candidate: &Symbol, symbol: &Symbol) -> bool {
         None => false,
         Some(home) if &**home == KEYWORD_PACKAGE => false,
         Some(home) => matches!(&**home, CL_PACKAGE | ESL_PACKAGE) || Some(home) == symbol.package(),
+    }
+}
+
+/// Returns whether a symbol names a type: a class, a type of `deftype`, or a standard type.
+pub(super) fn is_type(vm: &Vm, symbol: &Symbol) -> bool {
+    let class = super::value_for(vm, symbol).and_then(|value| vm.names.find_class(value));
+    class.is_some()
+        || is_class_of_image(vm, symbol)
+        || is_defined_type(vm, symbol)
+        || standard_types(vm).contains(symbol)
+}
+
+/// Returns whether a symbol names a type of `deftype`.
+fn is_defined_type(vm: &Vm, symbol: &Symbol) -> bool {
+    let indicator = Symbol::esl("%TYPE");
+    match super::object_for(vm, symbol) {
+        Some(object) => super::value_for(vm, &indicator)
+            .and_then(|indicator| super::property(&vm.heap, object, indicator))
+            .is_some_and(Value::is_true),
+        None => vm.names.images.definition(symbol).is_some_and(|(image, definition)| {
+            let wanted = Some((ESL_PACKAGE, indicator.name()));
+            definition.properties.iter().any(|&(name, _)| vm.names.images.symbol(image, name) == wanted)
+        }),
+    }
+}
+
+/// Returns whether a symbol names a class of the library that has not been made yet.
+fn is_class_of_image(vm: &Vm, symbol: &Symbol) -> bool {
+    vm.names.images.definition(symbol).is_some_and(|(_, definition)| definition.class.is_some())
+}
+
+/// Returns the names in the library's table of types.
+fn standard_types(vm: &Vm) -> Vec<Symbol> {
+    match vm.global(&Symbol::esl("%STANDARD-TYPES")).variable {
+        GlobalVariable::Constant(names) => {
+            names.elements().filter_map(|name| name.as_symbol().cloned()).collect()
+        }
+        _ => Vec::new(),
     }
 }
 
@@ -83,6 +129,12 @@ fn is_defined(vm: &Vm, value: Value, wanted: NameUse) -> bool {
         NameUse::Cause => super::value_for(vm, &Symbol::esl("%CAUSE"))
             .and_then(|indicator| super::property(&vm.heap, object, indicator))
             .is_some_and(Value::is_true),
+        NameUse::Type => {
+            vm.names.find_class(value).is_some()
+                || super::value_for(vm, &Symbol::esl("%TYPE"))
+                    .and_then(|indicator| super::property(&vm.heap, object, indicator))
+                    .is_some_and(Value::is_true)
+        }
     }
 }
 

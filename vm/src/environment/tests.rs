@@ -123,7 +123,7 @@ fn accessors_are_known_until_they_are_redefined() {
     let index = Constant::Integer(1.into());
     let define = vec![symbol("POINT-Y"), symbol("POINT"), index, Constant::Nil];
     load(&mut vm, &call(Builtin::DefineAccessor, define));
-    let expected = Accessor { class: Symbol::esl("POINT"), slot: 1, read_only: false };
+    let expected = Accessor { class: Symbol::esl("POINT"), slot: 1, access: SlotAccess::Free };
     assert_eq!(vm.global(&Symbol::esl("POINT-Y")).accessor, Some(expected));
     let name = vm.names.intern_esl(&mut vm.heap, "POINT-Y").unwrap();
     let car = vm.names.intern_cl(&mut vm.heap, "CAR").unwrap();

@@ -180,3 +180,29 @@ fn nets_nested_very_deep_have_a_short_report() {
     let lines = report("deep", program, &[]);
     assert!(lines.len() < 120 && lines.iter().filter(|line| line.trim() == "…").count() == 1, "{lines:#?}");
 }
+
+#[test]
+fn tasks_that_exhaust_the_memory_at_once_are_all_reported() {
+    let text = "
+(defun grow (list) (grow (cons (make-array 1000) list)))
+(defun plain () (list (grow nil)))
+(defun handling () (handler-bind ((type-error #'print)) (list (grow nil))))
+(dotimes (i 4) (spawn (plain)) (spawn (handling)))
+(sleep 60)
+(print 'done)";
+    let folder = Folder::with("reports-memory", &[("main.esl", text)]);
+    let mut command = eslvm(&["run", "--memory", "64M", "--clock", "virtual", "main.esl"]);
+    let done = process::run(command.current_dir(folder.path()), "");
+    assert_eq!((done.status, done.output.trim()), (Some(0), "DONE"), "{}", done.errors);
+    let reports: Vec<&str> = done.errors.split("In task ").skip(1).collect();
+    assert_eq!(reports.len(), 8, "{}", done.errors);
+    for report in reports {
+        assert!(
+            report.contains("begun at main.esl:5:") && report.contains("Failure :HEAP-EXHAUSTED"),
+            "{report}"
+        );
+        // A task without handlers has memory for its report while another one uses up the reserve.
+        let is_plain = report.contains("begun at main.esl:5:24");
+        assert!(!is_plain || report.contains("  in PLAIN, main.esl:3:"), "{report}");
+    }
+}

@@ -73,7 +73,7 @@ fn fresh_symbols() {
         ("(gensym)", "G3"),
         ("(gensym 'x)", "type-error X (OR STRING UNSIGNED-BYTE)"),
         ("(set '*gensym-counter* -1)", "-1"),
-        ("(gensym)", "type-error -1 UNSIGNED-BYTE"),
+        ("(gensym)", "type-error -1 of *GENSYM-COUNTER* UNSIGNED-BYTE"),
     ]);
 }
 
