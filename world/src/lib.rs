@@ -38,6 +38,8 @@ mod socket;
 mod tls;
 #[cfg(feature = "watch")]
 mod watch;
+#[cfg(feature = "http")]
+mod ws;
 
 use esl_vm::vm::Vm;
 

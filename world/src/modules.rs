@@ -27,6 +27,8 @@ const MODULES: &[HostModule] = &[
     HostModule { name: "serial", text: include_str!("../modules/serial.esl"), rows: crate::serial::rows },
     HostModule { name: "sockets", text: include_str!("../modules/sockets.esl"), rows: socket::rows },
     HostModule { name: "time", text: include_str!("../modules/time.esl"), rows: os::clock_rows },
+    #[cfg(feature = "http")]
+    HostModule { name: "ws", text: include_str!("../modules/ws.esl"), rows: crate::ws::rows },
 ];
 
 /// Functions that the library itself calls, by their names.

@@ -36,12 +36,12 @@ use crate::socket::socket_failure;
 const MOST_AT_ONCE: usize = 1 << 16;
 
 /// The body of a request: all of it, or what the program sends later.
-type RequestBody = Either<Full<Bytes>, Channel<Bytes>>;
+pub(crate) type RequestBody = Either<Full<Bytes>, Channel<Bytes>>;
 
 type AwaitedAnswer = Pin<Box<dyn Future<Output = hyper::Result<Response<Incoming>>> + Send>>;
 
 /// Reading and writing a connection, which ends with this.
-struct ConnectionDriver(JoinHandle<hyper::Result<()>>);
+pub(crate) struct ConnectionDriver(JoinHandle<hyper::Result<()>>);
 
 impl Drop for ConnectionDriver {
     fn drop(&mut self) {
@@ -178,15 +178,24 @@ async fn send(
     ca_file: Option<String>,
     request: Request<RequestBody>,
 ) -> Result<(AnswerProgress, ConnectionDriver), HostFailure> {
-    let stream = connect(address).await?;
-    // Requests are small, and are not to wait for more; without it they only take longer.
-    drop(stream.set_nodelay(true));
-    let (mut sender, driver) = match url.scheme() {
-        "https" => begin_secured(stream, url, ca_file).await?,
-        _ => begin(stream).await?,
-    };
+    let (mut sender, driver) = connect(address, url, ca_file).await?;
     let waiting = sender.send_request(request);
     Ok((AnswerProgress::Awaited(Box::pin(waiting), sender), driver))
+}
+
+/// Connects to the server of a URL and begins HTTP.
+pub(crate) async fn connect(
+    address: &str,
+    url: &Url,
+    ca_file: Option<String>,
+) -> Result<(SendRequest<RequestBody>, ConnectionDriver), HostFailure> {
+    let stream = connect_to(address).await?;
+    // Requests are small, and are not to wait for more; without it they only take longer.
+    drop(stream.set_nodelay(true));
+    match url.scheme() {
+        "https" => begin_secured(stream, url, ca_file).await,
+        _ => begin(stream).await,
+    }
 }
 
 /// Returns the body of a request, and the channel for its parts if it is a stream.
@@ -202,7 +211,7 @@ fn body_of(given: GivenBody) -> (RequestBody, Option<Sender<Bytes>>) {
 
 /// Returns a request. What it says about its connection and its body is said here, unless the program says
 /// it.
-fn request(
+pub(crate) fn request(
     method: &str,
     url: &Url,
     mut headers: HeaderMap,
@@ -261,7 +270,7 @@ fn check_length(headers: &HeaderMap, body: &RequestBody) -> Result<(), HostFailu
 }
 
 /// Connects to an address, by the first of its meanings that answers.
-async fn connect(address: &str) -> Result<TcpStream, HostFailure> {
+async fn connect_to(address: &str) -> Result<TcpStream, HostFailure> {
     let addresses =
         tokio::net::lookup_host(address).await.map_err(|error| HostFailure::new("HOST-NOT-FOUND", error))?;
     let mut last = HostFailure::new("HOST-NOT-FOUND", format!("`{address}` has no address"));
@@ -283,7 +292,7 @@ async fn begin(
     builder.allow_obsolete_multiline_headers_in_responses(true);
     let (sender, connection) =
         builder.handshake(TokioIo::new(stream)).await.map_err(|error| fault(&error))?;
-    Ok((sender, ConnectionDriver(tokio::spawn(connection))))
+    Ok((sender, ConnectionDriver(tokio::spawn(connection.with_upgrades()))))
 }
 
 #[cfg(feature = "tls")]
@@ -410,7 +419,7 @@ impl AnswerBody {
 }
 
 /// Returns the failure for a fault of a server, or of the connection to it.
-fn fault(error: &hyper::Error) -> HostFailure {
+pub(crate) fn fault(error: &hyper::Error) -> HostFailure {
     let mut reason: &dyn std::error::Error = error;
     while let Some(source) = reason.source() {
         reason = source;

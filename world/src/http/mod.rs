@@ -1,16 +1,18 @@
 //! HTTP 1.1 by hyper: requests of the program's, and a server that hands requests to the program.
 //!
 //! The modules have a part each: `target` what a URL says, `client` and `coding` a request and the body of
-//! its answer, `server`, `peer`, `greeting` and `address` the connections of others. Which function answers a
-//! request, and which redirections are followed, is decided in `modules/http.esl`.
+//! its answer, `server`, `head`, `body`, `peer`, `greeting` and `address` the connections of others. Which
+//! function answers a request, and which redirections are followed, is decided in `modules/http.esl`.
 //!
 //! Guarantees: what a peer sends is bounded in size, and in time where the program cannot bound it; nothing
 //! that the program gives for a header or a URL can end a line; a connection ends when its call is left.
 
 mod address;
+mod body;
 mod client;
 mod coding;
 mod greeting;
+mod head;
 mod peer;
 mod server;
 mod target;
@@ -18,6 +20,10 @@ mod target;
 use esl_host::{HostFailure, HostRows, Inbox};
 use hyper::HeaderMap;
 use hyper::header::{HeaderName, HeaderValue};
+
+pub(crate) use client::{RequestBody, connect, fault, request};
+pub(crate) use server::ServerSlot;
+pub(crate) use target::{address, parse as parse_url};
 
 /// Most bytes of the head of a request or an answer.
 const HEAD: usize = 64 << 10;
@@ -47,7 +53,7 @@ fn headers_as_pairs(headers: &HeaderMap) -> Vec<(String, String)> {
 }
 
 /// Returns the headers that the program gives.
-fn headers_of(given: Vec<(String, String)>) -> Result<HeaderMap, HostFailure> {
+pub(crate) fn headers_of(given: Vec<(String, String)>) -> Result<HeaderMap, HostFailure> {
     let mut headers = HeaderMap::with_capacity(given.len());
     for (name, value) in given {
         let known = HeaderName::from_bytes(name.as_bytes())

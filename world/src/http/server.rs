@@ -14,35 +14,34 @@ use std::time::Duration;
 use bytes::Bytes;
 use esl_bytecode::datum::Datum;
 use esl_host::{HostFailure, HostHandle, HostInput, HostObject, HostRows, IntoDatum, Payload, Right, Sender};
-use http_body_util::{BodyExt, Full};
-use hyper::body::{Body, Incoming};
+use http_body_util::Full;
+use hyper::body::Incoming;
 use hyper::header::{self, HeaderValue};
 use hyper::http::request::Parts;
-use hyper::http::uri::Authority;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
-use hyper::{Method, Request, Response, StatusCode, Version};
+use hyper::upgrade::OnUpgrade;
+use hyper::{Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpListener;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot, watch};
+use tokio::sync::{Semaphore, oneshot, watch};
 
 use super::address::AddressCounts;
+use super::body::receive;
 use super::greeting::{Greeted, UnknownVersion};
+use super::head::check;
 use super::peer::Peer;
 use super::{HEAD, HEADERS, headers_as_pairs, headers_of, http_failure, target};
 use crate::event_loop;
 use crate::operation::spawned;
 use crate::socket::{bind, bind_failure, lock, next_connection};
+use crate::ws::{Accepted, Handshake};
 
 /// Most connections at a time; more wait in the system's queue.
 const CONNECTIONS: usize = 1024;
 /// Time that a client has for the head of a request, and between two requests.
 const HEAD_TIME: Duration = Duration::from_secs(10);
-/// Time in which more of a body has to come.
-const BODY_TIME: Duration = Duration::from_secs(30);
-/// Most bytes of the body of a request.
-const BODY: u64 = 64 << 20;
 /// Most bytes of bodies, in units of 1024, of requests that are not answered.
 const BODIES: usize = 256 << 10;
 /// Time in which the last answers have to be sent when a server is closed.
@@ -55,11 +54,27 @@ const UNKNOWN_VERSION: &[u8] = b"HTTP/1.1 505 HTTP Version Not Supported\r\n\
 
 type HttpAnswer = Response<Full<Bytes>>;
 
+/// The answer of the program: one of HTTP, and the connection that begins with it, if there is one.
+struct ProgramAnswer {
+    answer: HttpAnswer,
+    accepted: Option<Accepted>,
+}
+
+/// A request that the program has yet to answer.
+struct AskedRequest {
+    answer: oneshot::Sender<ProgramAnswer>,
+    /// If it begins a connection of WebSocket.
+    handshake: Option<Handshake>,
+}
+
+/// A connection that switches from HTTP to WebSocket.
+type Switching = Arc<Mutex<Option<(OnUpgrade, Accepted)>>>;
+
 /// The state that the connections of a server share with the operations.
 struct ServerState {
     input: HostInput,
-    /// Where the answers go, by the numbers of their requests; the greatest number so far.
-    asked: Mutex<(i64, HashMap<i64, oneshot::Sender<HttpAnswer>>)>,
+    /// The requests that have no answer yet, by their numbers; the greatest number so far.
+    asked: Mutex<(i64, HashMap<i64, AskedRequest>)>,
     connections: Arc<Semaphore>,
     addresses: Arc<AddressCounts>,
     bodies: Arc<Semaphore>,
@@ -74,7 +89,7 @@ struct Server {
 
 /// A server of the program's; nothing before it listens, and after it is closed.
 #[derive(Default)]
-struct ServerSlot(Mutex<Option<Server>>);
+pub(crate) struct ServerSlot(Mutex<Option<Server>>);
 
 impl HostObject for ServerSlot {
     const KIND: &'static str = "HTTP-SERVER";
@@ -88,6 +103,20 @@ impl ServerSlot {
             .map(|server| server.shared.clone())
             .ok_or_else(|| http_failure("the server is closed"))
     }
+
+    /// Answers a request that begins a connection of WebSocket by the answer that `accept` makes.
+    pub(crate) fn switch(
+        &self,
+        request: i64,
+        accept: impl FnOnce(&Handshake) -> Result<(HttpAnswer, Accepted), HostFailure>,
+    ) -> Result<(), HostFailure> {
+        let gone = || HostFailure::new("CONNECTION-LOST", "the client has gone");
+        let asked = lock(&self.get()?.asked).1.remove(&request).ok_or_else(gone)?;
+        let handshake = asked.handshake.ok_or_else(|| http_failure("the request is not a handshake"))?;
+        let (answer, accepted) = accept(&handshake)?;
+        let accepted = Some(accepted);
+        asked.answer.send(ProgramAnswer { answer, accepted }).map_err(|_| gone())
+    }
 }
 
 /// Adds the functions of servers.
@@ -99,8 +128,8 @@ pub(super) fn add(rows: &mut HostRows) {
         ["server", "input", "address", "most", "certificate", "key"],
         "Has SERVER listen at ADDRESS, for at MOST so many connections from one address; by TLS, if there are files of \
          CERTIFICATE and KEY. Returns the port. The input with the name INPUT is signalled with each request: its \
-         number, method, path, the parts of that, query, headers, and body, a text if it is UTF-8, and bytes \
-         otherwise; and with the number alone when the client of one has gone.",
+         number, method, path, the parts of that, query, headers, body, a text if it is UTF-8, and bytes otherwise, \
+         and whether it begins a connection of WebSocket; and with the number alone when the client of one has gone.",
         listen,
     )
     .needs(Right::Net, "address")
@@ -248,7 +277,7 @@ async fn accept(
 }
 
 async fn converse(
-    stream: impl AsyncRead + AsyncWrite + Unpin,
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
     peer: Peer,
     shared: Arc<ServerState>,
     closes: watch::Receiver<bool>,
@@ -265,37 +294,50 @@ async fn converse(
         }
         _ => return,
     };
-    let service = service_fn(|request| respond(request, peer.clone(), shared.clone()));
+    let switching = Switching::default();
+    let service = service_fn(|request| respond(request, peer.clone(), shared.clone(), switching.clone()));
     let mut builder = http1::Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME).half_close(true);
     builder.max_buf_size(2 * HEAD).max_header_size(HEAD).max_headers(HEADERS).title_case_headers(true);
-    let mut connection = pin!(builder.serve_connection(TokioIo::new(stream), service));
+    let mut connection = pin!(builder.serve_connection(TokioIo::new(stream), service).with_upgrades());
     if unless_closing(closes.clone(), connection.as_mut()).await.is_none() {
         connection.as_mut().graceful_shutdown();
         _ = tokio::time::timeout(GOODBYE, connection).await;
+        return;
+    }
+    let switched = lock(&switching).take();
+    if let Some((upgrade, accepted)) = switched {
+        // The server's end waits for it, for a while: the program closes the connection then.
+        accepted.run(upgrade).await;
+        drop(closes);
     } else {
         // All answers are sent, so the end of the server does not wait for this connection.
         drop(closes);
-        peer.end().await;
     }
+    peer.end().await;
 }
 
 /// Returns the answer to a request, which the program gives unless the request is malformed.
 async fn respond(
-    request: Request<Incoming>,
+    mut request: Request<Incoming>,
     peer: Peer,
     shared: Arc<ServerState>,
+    switching: Switching,
 ) -> Result<HttpAnswer, Error> {
+    let upgrade = hyper::upgrade::on(&mut request);
     let (head, body) = request.into_parts();
-    if let Err((status, reason)) = check(&head) {
-        return Ok(refusal(status, reason));
-    }
+    let handshake = match check(&head).and_then(|()| Handshake::read(&head)) {
+        Ok(handshake) => handshake,
+        Err((status, reason)) => return Ok(refusal(status, reason)),
+    };
     let (body, room) = match receive(body, &shared.bodies).await {
         Ok(received) => received,
         Err((status, reason)) => return Ok(refusal(status, &reason)),
     };
-    let (mut asked, answered) = PendingRequest::new(shared.clone());
-    let arguments = as_data(asked.id, &head, &body);
+    let is_handshake = handshake.is_some();
+    let (mut asked, answered) = PendingRequest::new(shared.clone(), handshake);
+    let mut arguments = as_data(asked.id, &head, &body);
+    arguments.push(is_handshake.into_datum());
     drop(body);
     let answer = async {
         // While there is no room in the input, the client waits.
@@ -309,7 +351,13 @@ async fn respond(
         () = peer.gone() => return Err(Error::other("the client has gone")),
     };
     drop((asked, room));
-    Ok(answer.unwrap_or_else(|_| refusal(StatusCode::SERVICE_UNAVAILABLE, "this request was given up")))
+    let Ok(ProgramAnswer { answer, accepted }) = answer else {
+        return Ok(refusal(StatusCode::SERVICE_UNAVAILABLE, "this request was given up"));
+    };
+    if let Some(accepted) = accepted {
+        *lock(&switching) = Some((upgrade, accepted));
+    }
+    Ok(answer)
 }
 
 /// A request that the program has been asked to answer.
@@ -321,13 +369,16 @@ struct PendingRequest {
 }
 
 impl PendingRequest {
-    fn new(shared: Arc<ServerState>) -> (PendingRequest, oneshot::Receiver<HttpAnswer>) {
+    fn new(
+        shared: Arc<ServerState>,
+        handshake: Option<Handshake>,
+    ) -> (PendingRequest, oneshot::Receiver<ProgramAnswer>) {
         let (answer, answered) = oneshot::channel();
         let id = {
             let mut asked = lock(&shared.asked);
             asked.0 += 1;
             let id = asked.0;
-            asked.1.insert(id, answer);
+            asked.1.insert(id, AskedRequest { answer, handshake });
             id
         };
         (PendingRequest { shared, id, is_signalled: false }, answered)
@@ -345,88 +396,6 @@ impl Drop for PendingRequest {
     }
 }
 
-/// Checks a head for the faults that the parser lets pass.
-fn check(head: &Parts) -> Result<(), (StatusCode, &'static str)> {
-    if head.method == Method::CONNECT {
-        return Err((StatusCode::NOT_IMPLEMENTED, "this server is not a proxy"));
-    }
-    let path = head.uri.path();
-    let is_of_server = path == "*" && head.method == Method::OPTIONS;
-    if !path.starts_with('/') && !is_of_server {
-        return Err((StatusCode::BAD_REQUEST, "the target of the request is not a path"));
-    }
-    let mut hosts = head.headers.get_all(header::HOST).iter();
-    match (hosts.next(), hosts.next()) {
-        (Some(host), None) if is_host(host) => {}
-        (None, None) if head.version == Version::HTTP_10 => {}
-        _ => {
-            return Err((
-                StatusCode::BAD_REQUEST,
-                "the request needs one header Host, a host with or without a port",
-            ));
-        }
-    }
-    let expectation = head.headers.get(header::EXPECT);
-    if expectation.is_some_and(|expected| !expected.as_bytes().eq_ignore_ascii_case(b"100-continue")) {
-        return Err((StatusCode::EXPECTATION_FAILED, "the expectation is unknown"));
-    }
-    Ok(())
-}
-
-/// Returns whether a header names a host, with or without a port. It is empty for a URL without one.
-fn is_host(value: &HeaderValue) -> bool {
-    let bytes = value.as_bytes();
-    let has_host = |host: Authority| !host.host().is_empty() && !host.as_str().contains('@');
-    bytes.is_empty() || Authority::try_from(bytes).is_ok_and(has_host)
-}
-
-type Received = (Vec<u8>, Vec<OwnedSemaphorePermit>);
-
-/// Receives the body of a request, and the room that it takes.
-async fn receive(mut body: Incoming, room: &Arc<Semaphore>) -> Result<Received, (StatusCode, String)> {
-    let too_long = || (StatusCode::PAYLOAD_TOO_LARGE, format!("a body has at most {BODY} bytes"));
-    // The header `Content-Length` is the lower bound.
-    if body.size_hint().lower() > BODY {
-        return Err(too_long());
-    }
-    let (mut bytes, mut taken) = (Vec::new(), Vec::new());
-    loop {
-        let frame = match tokio::time::timeout(BODY_TIME, body.frame()).await {
-            Ok(None) => return Ok((bytes, taken)),
-            Ok(Some(Ok(frame))) => frame,
-            Ok(Some(Err(error))) => {
-                return Err((StatusCode::BAD_REQUEST, format!("the body is invalid: {}", innermost(&error))));
-            }
-            Err(_) => return Err((StatusCode::REQUEST_TIMEOUT, "the body does not come".into())),
-        };
-        // Trailers are not for the program.
-        let Ok(data) = frame.into_data() else { continue };
-        if (bytes.len() + data.len()) as u64 > BODY {
-            return Err(too_long());
-        }
-        bytes.extend_from_slice(&data);
-        let wanted = bytes
-            .len()
-            .div_ceil(1024)
-            .saturating_sub(taken.iter().map(OwnedSemaphorePermit::num_permits).sum());
-        if wanted > 0 {
-            let permit = room.clone().try_acquire_many_owned(u32::try_from(wanted).unwrap_or(u32::MAX));
-            taken.push(permit.map_err(|_| {
-                (StatusCode::SERVICE_UNAVAILABLE, "there is no room for the body at this time".to_owned())
-            })?);
-        }
-    }
-}
-
-/// Returns the text of the innermost cause of an error.
-fn innermost(error: &hyper::Error) -> String {
-    let mut reason: &dyn std::error::Error = error;
-    while let Some(source) = reason.source() {
-        reason = source;
-    }
-    reason.to_string()
-}
-
 /// Returns an answer that ends the connection.
 fn refusal(status: StatusCode, reason: &str) -> HttpAnswer {
     let mut response = Response::new(Full::new(Bytes::copy_from_slice(reason.as_bytes())));
@@ -434,6 +403,10 @@ fn refusal(status: StatusCode, reason: &str) -> HttpAnswer {
     let headers = response.headers_mut();
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("text/plain; charset=utf-8"));
     headers.insert(header::CONNECTION, HeaderValue::from_static("close"));
+    if status == StatusCode::UPGRADE_REQUIRED {
+        headers.insert(header::UPGRADE, HeaderValue::from_static("websocket"));
+        headers.insert(header::SEC_WEBSOCKET_VERSION, HeaderValue::from_static("13"));
+    }
     response
 }
 
@@ -475,5 +448,6 @@ fn answer(
     *response.headers_mut() = headers;
     let shared = server.get()?;
     let asked = lock(&shared.asked).1.remove(&request);
-    Ok(asked.is_some_and(|asked| asked.send(response).is_ok()))
+    let answer = ProgramAnswer { answer: response, accepted: None };
+    Ok(asked.is_some_and(|asked| asked.answer.send(answer).is_ok()))
 }

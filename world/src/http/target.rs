@@ -6,7 +6,7 @@ use url::{ParseError, Url};
 use super::http_failure;
 
 /// Returns the URL that a text says: relative to another one, if there is one.
-pub(super) fn parse(url: &str, base: Option<&Url>) -> Result<Url, HostFailure> {
+pub(crate) fn parse(url: &str, base: Option<&Url>) -> Result<Url, HostFailure> {
     // The rules of browsers have line ends and tabs dropped.
     if url.contains(|character: char| character.is_control()) {
         return Err(http_failure(format!("the URL `{}` contains a control character", url.escape_debug())));
@@ -26,7 +26,7 @@ fn not_http(url: &str) -> HostFailure {
 }
 
 /// Returns the host and the port of a URL.
-pub(super) fn address(url: &Url) -> String {
+pub(crate) fn address(url: &Url) -> String {
     let port = url.port_or_known_default().unwrap_or(80);
     format!("{}:{port}", url.host_str().unwrap_or_default())
 }

@@ -68,6 +68,10 @@ mod transcripts;
 mod tutorial;
 #[cfg(unix)]
 mod world;
+#[cfg(unix)]
+mod ws;
+#[cfg(unix)]
+mod ws_peers;
 
 use std::process::Command;
 

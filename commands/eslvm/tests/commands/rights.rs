@@ -173,6 +173,8 @@ fn every_access_to_the_outside_needs_its_right() {
         (r#"(http:get "http://example.com/x")"#, ":NET", "example.com:80"),
         (r#"(http:post "https://example.com/x" :body "y")"#, ":NET", "example.com:443"),
         (r#"(http:with-server (8080) (:get "/" () "x"))"#, ":NET", "127.0.0.1:8080"),
+        (r#"(ws:with-connection (c "ws://h/x") c)"#, ":NET", "h:80"),
+        (r#"(ws:with-connection (c "wss://h:9/x" :ca-file "/tmp/x") c)"#, ":NET", "h:9"),
         (r#"(mqtt:with-client (c "h" 1883) c)"#, ":NET", "h:1883"),
         (r#"(serial:with-serial-port (s "/dev/ttyS0") s)"#, ":SERIAL", "/dev/ttyS0"),
         (r#"(log:to-file "/tmp/log")"#, ":WRITE", "/tmp/log"),
@@ -191,7 +193,7 @@ fn every_access_to_the_outside_needs_its_right() {
     let folder = folder("rights-of-all");
     let mut program = String::from(
         "(require :sockets) (require :process) (require :http) (require :mqtt) (require :serial) (require :log)
-         (require :os)
+         (require :os) (require :ws)
          (defmacro refusal (form)
            `(with-recovery-procedures (((:permission-denied right object flag) (abort (list right object flag))))
               ,form))\n",
