@@ -32,6 +32,13 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     )
     .everywhere();
     rows.at_once(
+        "%BT-IS-OF-NAV2",
+        ["name"],
+        "Returns whether the leaf NAME is an action or a service of Nav2.",
+        |name: String| Ok(crate::ros::row(&name).is_some()),
+    )
+    .everywhere();
+    rows.at_once(
         "%BT-VALUE",
         ["text"],
         "Returns the value that TEXT, of a port, stands for.",

@@ -14,7 +14,7 @@ use esl_trees::{TreeFault, TreeSource, import, includes};
 
 /// Names of the language that a function of a program cannot have.
 const RESERVED: &str = "(loop for name being the external-symbols of :esl \
-    when (fboundp name) collect (string-downcase (symbol-name name)))";
+    when (or (fboundp name) (special-operator-p name)) collect (string-downcase (symbol-name name)))";
 
 /// Arguments of `eslc import`.
 #[derive(Args, Debug)]

@@ -13,8 +13,9 @@ const WIDTH: usize = 88;
 const BROKEN: usize = 1 << 20;
 
 /// Operators whose forms take several lines.
-const BROKEN_OPERATORS: [&str; 14] = [
+const BROKEN_OPERATORS: [&str; 15] = [
     "bt:round-robin",
+    "bt:sequence-with-memory",
     "bt:ticking",
     "bt:with-outcome",
     "bt:with-recovery",

@@ -163,7 +163,6 @@ impl Modes {
             BehaviourKind::ReactiveSequence | BehaviourKind::ReactiveFallback => guards_are_tests && last > 0,
             BehaviourKind::WhileDoElse => node.children.len() == 2 && self.is_test[node.children[0]],
             BehaviourKind::Parallel => parallel(node).is_some(),
-            BehaviourKind::SequenceWithMemory => !has_repeating_ancestor(model, index),
             BehaviourKind::Switch(_) => !is_concurrent(model, index),
             BehaviourKind::RunOnce => node.text("then_skip").as_deref() == Some("true"),
             _ => true,
@@ -221,8 +220,8 @@ pub(crate) fn is_paced(kind: BehaviourKind) -> bool {
     )
 }
 
-/// Returns whether a node around repeats this one after a failure, which then goes on in the middle.
-fn has_repeating_ancestor(model: &Model, index: usize) -> bool {
+/// Returns whether a node may be left before its end, and ticked again later, when it goes on in the middle.
+pub(crate) fn may_be_resumed(model: &Model, index: usize) -> bool {
     let mut parent = model.nodes[index].parent;
     while let Some(ancestor) = parent {
         let node = &model.nodes[ancestor];
@@ -231,7 +230,7 @@ fn has_repeating_ancestor(model: &Model, index: usize) -> bool {
         }
         parent = node.parent;
     }
-    false
+    model.nodes[index].tree != model.main
 }
 
 /// Returns whether other nodes run beside this one, or change its variable below it.

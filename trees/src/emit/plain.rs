@@ -180,6 +180,9 @@ impl Emitter<'_> {
         }
         let node = &self.model.nodes[index];
         match node.kind {
+            BehaviourKind::SequenceWithMemory if modes::may_be_resumed(self.model, index) => {
+                self.sequence_with_memory(index)
+            }
             BehaviourKind::Sequence | BehaviourKind::SequenceWithMemory => self.all_children(&node.children),
             BehaviourKind::Fallback => self.fallback(index),
             BehaviourKind::Parallel => self.parallel(node),
@@ -423,6 +426,17 @@ impl Emitter<'_> {
         let children: Vec<FormId> = children.into_iter().map(|body| self.progn(body)).collect();
         self.needs_bt = true;
         vec![self.forms.call("bt:round-robin", 2, std::iter::once(head).chain(children))]
+    }
+
+    fn sequence_with_memory(&mut self, index: usize) -> Vec<FormId> {
+        let node = &self.model.nodes[index];
+        let wanted = format!("next-of-{}", kebab(node.title()));
+        let variable = self.state(&wanted, "0", "Number of the form that is evaluated next.");
+        let head = self.forms.atoms(&[&variable]);
+        let children: Vec<Vec<FormId>> = node.children.iter().map(|&child| self.statements(child)).collect();
+        let children: Vec<FormId> = children.into_iter().map(|body| self.progn(body)).collect();
+        self.needs_bt = true;
+        vec![self.forms.call("bt:sequence-with-memory", 2, std::iter::once(head).chain(children))]
     }
 
     fn custom(&mut self, index: usize) -> Vec<FormId> {

@@ -4,6 +4,7 @@ use crate::catalogue::BehaviourKind;
 use crate::emit::Emitter;
 use crate::emit::form::FormId;
 use crate::model::{Moment, PortValue, TreeNode};
+use crate::ros;
 
 /// Names of the options of nodes, and the ports that they come from.
 const OPTIONS: [(BehaviourKind, &[(&str, &str)]); 16] = [
@@ -117,6 +118,18 @@ impl Emitter<'_> {
         let body = self.statements(child);
         if self.modes.is_instant[child] && node.children.is_empty() && node.conditions.is_empty() {
             return self.forms.call(":call", 1, body);
+        }
+        let keeps = node.kind == BehaviourKind::Action
+            && node.conditions.is_empty()
+            && ros::row(&node.id).is_none()
+            && node.parent.is_some_and(|parent| {
+                matches!(
+                    self.model.nodes[parent].kind,
+                    BehaviourKind::Pipeline | BehaviourKind::Nonblocking | BehaviourKind::WhileDoElse
+                )
+            });
+        if keeps {
+            return self.forms.call(":action", 1, body);
         }
         self.progn(body)
     }

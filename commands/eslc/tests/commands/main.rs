@@ -6,6 +6,7 @@ mod editor;
 mod editors;
 mod frames;
 mod grammar;
+mod import;
 mod lsp;
 mod renaming;
 mod typing;

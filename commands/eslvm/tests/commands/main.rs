@@ -65,6 +65,7 @@ mod testing;
 mod timeline;
 mod traces;
 mod transcripts;
+mod trees;
 mod tutorial;
 #[cfg(unix)]
 mod world;
