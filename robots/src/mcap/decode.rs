@@ -40,6 +40,15 @@ impl MessageForm {
         }
     }
 
+    /// Returns the hash of the type of a channel's messages, if they are of ROS 2: that which its writer
+    /// states if the type is a part of an action or a service, whose hash its text does not tell.
+    pub(super) fn hash(&self, channel: &McapChannel) -> Option<String> {
+        let MessageForm::Ros(of_type) = self else { return None };
+        let is_part = channel.schema.as_ref().is_some_and(|schema| schema.name != of_type.name());
+        let stated = channel.metadata.get("topic_type_hash").filter(|_| is_part);
+        Some(stated.map_or(of_type.hash(), String::as_str).to_owned())
+    }
+
     /// Returns a payload as data.
     pub(super) fn decode(&self, topic: &str, payload: &esl_bytecode::Bytes) -> DecodedPayload {
         let fault = |reason: String| DecodedPayload { form: "FAULT", data: reason.into_datum() };
@@ -65,7 +74,9 @@ impl MessageForm {
 /// Returns the type that a schema of ROS 2 describes: by its own text, whose types come before those that
 /// come with ESL.
 fn message_type(schema: &McapSchema) -> Result<Arc<MessageType>, TypeFault> {
+    // Parts of actions and services are messages in a text.
+    let name = schema.name.replacen("/action/", "/msg/", 1).replacen("/srv/", "/msg/", 1);
     let types = Types::bundled();
-    types.define(&schema.name, &String::from_utf8_lossy(&schema.data))?;
-    types.message(&schema.name)
+    types.define(&name, &String::from_utf8_lossy(&schema.data))?;
+    types.message(&name)
 }

@@ -87,10 +87,7 @@ impl McapInput {
             let metadata: Vec<(String, String)> =
                 channel.metadata.iter().map(|(name, value)| (name.clone(), value.clone())).collect();
             let schema = channel.schema.as_deref();
-            let hash = match MessageForm::of(channel) {
-                MessageForm::Ros(of_type) => Some(of_type.hash().to_owned()),
-                _ => None,
-            };
+            let hash = MessageForm::of(channel).hash(channel);
             let text = schema.map(|schema| match std::str::from_utf8(&schema.data) {
                 Ok(text) => text.into_datum(),
                 Err(_) => schema.data.clone().into_datum(),

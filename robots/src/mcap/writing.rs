@@ -77,7 +77,7 @@ impl McapWriter {
             types.define(name, text)?;
         }
         let of_type = types.message(name)?;
-        let channel = ros_channel(topic, &types, &of_type, metadata)?;
+        let channel = ros_channel(topic, &types, &of_type, metadata);
         let number = self.output.channel(channel).map_err(failure)?;
         self.types().insert(number, of_type);
         Ok(number)
@@ -114,9 +114,10 @@ pub(super) fn ros_channel(
     types: &Types,
     of_type: &MessageType,
     mut metadata: Vec<(String, String)>,
-) -> Result<OutputChannel, HostFailure> {
-    let text = types.joined_text(of_type.name())?;
+) -> OutputChannel {
+    // Parts of actions and services have no text of their own.
+    let text = types.joined_text(of_type.name()).unwrap_or_else(|_| of_type.text_of_fields());
     metadata.push(("topic_type_hash".into(), of_type.hash().to_owned()));
     let schema = Some((of_type.name().to_owned(), "ros2msg".into(), Bytes::from(text)));
-    Ok(OutputChannel { topic, encoding: "cdr".into(), schema, metadata })
+    OutputChannel { topic, encoding: "cdr".into(), schema, metadata }
 }

@@ -18,9 +18,8 @@ impl Types {
         let mut parts = Vec::new();
         add_parts(&message, &mut parts);
         for part in parts {
-            let short = part.replacen("/msg/", "/", 1);
-            let separator = "=".repeat(80);
-            _ = write!(text, "\n{separator}\nMSG: {short}\n{}", self.text(&part)?);
+            let (separator, name) = ("=".repeat(80), short(&part));
+            _ = write!(text, "\n{separator}\nMSG: {name}\n{}", self.text(&part)?);
         }
         Ok(text)
     }
@@ -37,12 +36,15 @@ impl MessageType {
     }
 }
 
+/// Returns a name without its middle part, as texts have it: `std_msgs/Header`. Parts of actions and services
+/// are messages there, too.
+fn short(name: &str) -> String {
+    let kinds = ["/msg/", "/srv/", "/action/"];
+    kinds.iter().fold(name.to_owned(), |name, kind| name.replacen(kind, "/", 1))
+}
+
 fn fields_of(message: &MessageType) -> String {
-    let line = |field: &MessageField| {
-        let written = field.type_text();
-        // A name without `/msg/` is that of a message.
-        format!("{} {}\n", written.replacen("/msg/", "/", 1), field.name)
-    };
+    let line = |field: &MessageField| format!("{} {}\n", short(&field.type_text()), field.name);
     message.fields().iter().map(line).collect()
 }
 
@@ -53,8 +55,8 @@ fn add_texts(message: &MessageType, names: &mut Vec<String>, text: &mut String) 
             && !names.iter().any(|name| name == part.name())
         {
             names.push(part.name().to_owned());
-            let short = part.name().replacen("/msg/", "/", 1);
-            _ = write!(text, "\n{}\nMSG: {short}\n{}", "=".repeat(80), fields_of(part));
+            let (separator, name) = ("=".repeat(80), short(part.name()));
+            _ = write!(text, "\n{separator}\nMSG: {name}\n{}", fields_of(part));
             add_texts(part, names, text);
         }
     }
@@ -88,6 +90,11 @@ mod tests {
             types.define(name, &known.text_of_fields()).expect("it is well-formed");
             assert_eq!(types.message(name).expect("defined").hash(), known.hash(), "{name}");
         }
+        // A part of an action is a message of its own in a text.
+        let name = "example_interfaces/action/Fibonacci_FeedbackMessage";
+        let text = bundled.message(name).expect("it is bundled").text_of_fields();
+        assert!(text.contains("\nexample_interfaces/Fibonacci_Feedback feedback\n"), "{text}");
+        assert!(text.contains("\nMSG: example_interfaces/Fibonacci_Feedback\nint32[] sequence\n"), "{text}");
         let text = bundled.joined_text("std_msgs/Header").expect("it is bundled");
         assert!(text.contains("\nMSG: builtin_interfaces/Time\n"), "{text}");
     }

@@ -143,6 +143,15 @@ fn files_of_others_are_read_in_every_form() {
             assert_eq!(lines(&done.output), expected, "{name}: {}", done.errors);
         }
     }
+    // A part of an action is a message of its own in the file.
+    let text = "(require :mcap)
+(mcap:with-file (file \"part.mcap\" :direction :output)
+  (mcap:write (mcap:channel file \"/part\" :type \"example_interfaces/action/Fibonacci_FeedbackMessage\")
+              '(:feedback (:sequence (0 1 1)))))";
+    folder.file("write.esl", text);
+    assert_eq!(run(&folder, &["run", "write.esl"]).status, Some(0));
+    let done = run(&folder, &["run", "main.esl", "part.mcap"]);
+    assert!(lines(&done.output)[0].ends_with(":FEEDBACK (:SEQUENCE #(0 1 1)))))"), "{}", done.output);
     // The types are in the file alone.
     let done = run(&folder, &["run", "main.esl", "ros.mcap"]);
     let last = "(:COUNT 40 :LAST (\"/range\" 19.000000001 \
