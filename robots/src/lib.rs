@@ -1,4 +1,4 @@
-//! Modules for ESL programs that talk to robots: Zenoh, nodes and messages of ROS 2, and
+//! Modules for ESL programs that talk to robots: Zenoh, nodes and messages of ROS 2, MAVLink, and
 //! files of MCAP.
 //!
 //! ```
@@ -6,6 +6,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod mavlink;
 pub mod mcap;
 pub mod message;
 mod ros;
@@ -19,8 +20,32 @@ fn none(inbox: &Inbox) -> HostRows {
     HostRows::new(inbox)
 }
 
-/// The modules. Those whose names begin with `ros-` are parts of `ros`, which requires them.
+/// The modules. Those whose names begin with `ros-` are parts of `ros`, which requires them; so are those of
+/// `mavlink-`.
 pub const MODULES: &[HostModule] = &[
+    HostModule { name: "mavlink", text: include_str!("../modules/mavlink.esl"), rows: mavlink::rows },
+    HostModule {
+        name: "mavlink-commands",
+        text: include_str!("../modules/mavlink-commands.esl"),
+        rows: none,
+    },
+    HostModule {
+        name: "mavlink-missions",
+        text: include_str!("../modules/mavlink-missions.esl"),
+        rows: none,
+    },
+    HostModule {
+        name: "mavlink-parameters",
+        text: include_str!("../modules/mavlink-parameters.esl"),
+        rows: none,
+    },
+    HostModule {
+        name: "mavlink-transfers",
+        text: include_str!("../modules/mavlink-transfers.esl"),
+        rows: none,
+    },
+    HostModule { name: "mavlink-vehicle", text: include_str!("../modules/mavlink-vehicle.esl"), rows: none },
+    HostModule { name: "mavlink-worlds", text: include_str!("../modules/mavlink-worlds.esl"), rows: none },
     HostModule { name: "mcap", text: include_str!("../modules/mcap.esl"), rows: self::mcap::rows },
     HostModule { name: "ros", text: include_str!("../modules/ros.esl"), rows: ros::rows },
     HostModule { name: "ros-actions", text: include_str!("../modules/ros-actions.esl"), rows: none },

@@ -133,7 +133,7 @@ fn unknown_field(message_type: &MessageType, message: &Datum, key: &Datum) -> Me
 }
 
 /// Returns the name that is most similar to a given one, if any is similar.
-pub(super) fn nearest(given: &str, names: impl Iterator<Item = String>) -> Option<String> {
+pub(crate) fn nearest(given: &str, names: impl Iterator<Item = String>) -> Option<String> {
     const SIMILAR: f64 = 0.75;
     let rated = names.map(|name| (strsim::jaro_winkler(given, &name), name));
     let best = rated.filter(|(similarity, _)| *similarity >= SIMILAR).max_by(|a, b| a.0.total_cmp(&b.0));

@@ -26,6 +26,7 @@ mod types;
 mod writer;
 
 pub use complete::complete;
+pub(crate) use complete::nearest;
 pub use definition::{FieldExtent, MessageConstant};
 pub use fault::{DefinitionProblem, MessageFault, MessageProblem, TypeFault};
 pub use message_type::{ActionType, Element, MessageField, MessageType, ServiceType, keyword};

@@ -23,6 +23,7 @@ mod chapters {
         embedding = "embedding.md",
         failure = "failure.md",
         goals = "goals.md",
+        mavlink = "mavlink.md",
         mcap = "mcap.md",
         modules = "modules.md",
         operate = "operate.md",
