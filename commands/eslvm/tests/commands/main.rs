@@ -12,6 +12,7 @@ mod background;
 mod bad_input;
 #[cfg(unix)]
 mod browser;
+mod copter;
 mod coverage;
 mod deadlock;
 mod documents;
@@ -27,6 +28,7 @@ mod lines;
 #[cfg(target_os = "linux")]
 mod manipulator;
 mod manual;
+mod mavlink;
 #[cfg(unix)]
 mod mcap;
 mod memory;
