@@ -162,3 +162,28 @@ fn motors_are_off_however_a_run_of_the_embedders_ends() {
         assert_eq!(*off.lock().expect("nobody panics with it"), ["right", "left"], "{way}");
     }
 }
+
+/// Data for which the memory has no room fail the call that they answer, and no other one; of a signal, they
+/// are dropped with it.
+#[test]
+fn data_without_room_fail_their_own_call() {
+    let config = Config { memory: 16 << 20, ..Config::default() };
+    let mut engine = Engine::with(config, Box::new(VirtualHost::new())).expect("there is room");
+    let text = "x".repeat(64 << 20);
+    let (answer, calls) = (text.clone(), Arc::new(AtomicUsize::new(0)));
+    let count = calls.clone();
+    let big = move |_: Call| {
+        count.fetch_add(1, Ordering::SeqCst);
+        Ok::<String, Failure>(answer.clone())
+    };
+    engine.define("BIG", "()", "Much text.", big).expect("it is a name");
+    engine.define("SMALL", "()", "A number.", |_| Ok::<i64, Failure>(7)).expect("it is a name");
+    let outcome = "(flet ((outcome () (handler-case (big) (heap-exhausted () :full))))
+                     (list (outcome) (small) (outcome) (small)))";
+    check(&mut engine, outcome, "(:FULL 7 :FULL 7)");
+    assert_eq!(calls.load(Ordering::SeqCst), 2);
+    engine.eval("(define-input news)").expect("it compiles");
+    engine.handle().signal("news", [text.into()]).expect("the program has the input");
+    engine.handle().signal("news", [1_i64.into()]).expect("the program has the input");
+    check(&mut engine, "(list (multiple-value-list (wait-for-event news)) (input-dropped news))", "((1) 1)");
+}

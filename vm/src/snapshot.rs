@@ -107,7 +107,7 @@ impl Vm {
             console,
             functions: _,
             calls,
-            answer,
+            answers,
             operations,
             inputs,
             senders,
@@ -119,7 +119,7 @@ impl Vm {
             && scheduler.tasks.has_freed_all()
             && compiler.jobs.is_empty()
             && operations.is_empty()
-            && answer.is_none()
+            && answers.is_empty()
             && !inbox.is_rung()
             && !watch.is_watched;
         if !rests {
@@ -179,7 +179,7 @@ impl Vm {
         let restored = self.outside.host.restore_all(&outside.host);
         debug_assert!(restored, "a host takes back a state of its own");
         self.outside.console = outside.console.clone();
-        self.outside.answer = None;
+        self.outside.answers.clear();
         self.outside.operations = outside.operations.clone();
         self.outside.inputs.clone_from(&outside.inputs);
         self.outside.senders = outside.senders;

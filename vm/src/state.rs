@@ -168,7 +168,7 @@ state! {
     Outside by VisitOutside :: outside_content {
         content { exit_status, console, operations, inputs }
         course { senders, attendance }
-        transient { answer }
+        transient { answers }
         process { host, inbox, functions, calls, complaints }
     }
 }

@@ -49,7 +49,9 @@ pub(super) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (function, data) = host_call(vm, arguments)?;
     // The function has effects that cannot be done twice, so what it gives is kept until there is room for
     // it.
-    let answer = match vm.outside.answer.take() {
+    let task = vm.scheduler.task().number;
+    let base = vm.offset_of(vm.cpu.base()) as u32;
+    let answer = match vm.outside.answers.take(task, base) {
         Some(answer) => answer,
         None => match function.and_then(|function| vm.outside.call(function, &data)) {
             Some(answer) => answer,
@@ -58,7 +60,7 @@ pub(super) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     match give_answer(vm, &answer) {
         Err(Exit::Collect) => {
-            vm.outside.answer = Some(answer);
+            vm.outside.answers.keep(task, base, answer);
             Err(Exit::Collect)
         }
         outcome => outcome,

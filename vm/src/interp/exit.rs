@@ -203,6 +203,8 @@ fn run_out(vm: &mut Vm, is_call: bool, has_collected: bool) -> Signal {
     if is_call {
         vm.cpu.ticks -= 1;
     }
+    // The instruction fails instead of being executed again.
+    vm.drop_answers(vm.offset_of(vm.cpu.base()) as u32);
     if !vm.heap.open_reserve() && !vm.open_report_memory() {
         vm.leave_reserve(vm.names.known.heap_exhausted);
         return Signal::Unwind;

@@ -267,6 +267,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             UnwindTarget::Return { entries, base } if height <= entries => {
                 task.control.bindings.truncate_from(base);
                 vm.exchange.values = unwinding.values;
+                vm.drop_answers(base);
                 // SAFETY: the base is that of a frame that the task has not left, so it lies in the stack.
                 unsafe { vm.cpu.set_base(vm.scheduler.task().stack.start().add(base as usize)) };
                 vm.close_reserves();
@@ -275,6 +276,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             UnwindTarget::Root(end) if height == 0 => {
                 task.control.bindings.truncate(0);
                 vm.exchange.values = unwinding.values;
+                vm.drop_answers(0);
                 vm.scheduler.turn.ending = Some(end);
                 return Signal::TaskExit;
             }
@@ -287,6 +289,8 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             return Signal::Tick;
         }
         let Some(entry) = task.control.entries.pop() else { return Signal::Reload };
+        vm.drop_answers(entry.base);
+        let task = vm.scheduler.task_mut();
         match entry.kind {
             EntryKind::FailureCleanup if !unwinding.target.is_final() => {
                 // The unwinding is not that of a failure.
@@ -343,6 +347,8 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
     let control = &mut vm.scheduler.task_mut().control;
     let Some(entry) = control.entries.pop() else { return Signal::Reload };
     control.bindings.truncate(entry.bindings as usize);
+    vm.drop_answers(entry.base);
+    let control = &mut vm.scheduler.task_mut().control;
     if entry.kind == EntryKind::FailureCleanup {
         // The failure waits for the end of the cleanup as the values of a protected form do.
         control.run_cleanup(entry, RunningCleanup { values, ..RunningCleanup::default() });
@@ -421,6 +427,14 @@ impl Vm {
         unsafe {
             self.cpu.set_pc(entry.pc.get());
             self.cpu.set_base(self.scheduler.task().stack.start().add(entry.base as usize));
+        }
+    }
+
+    /// Drops the answers of the embedder's functions to calls of the running task's frames from the one at
+    /// `base` inward, which are left.
+    pub(super) fn drop_answers(&mut self, base: u32) {
+        if !self.outside.answers.is_empty() {
+            self.outside.answers.drop_from(self.scheduler.task().number, base);
         }
     }
 

@@ -22,6 +22,42 @@ pub(crate) struct Given {
     pub(crate) needs: Vec<Need>,
 }
 
+/// Answers of functions of the embedder's for which the heap has no room yet. The functions have effects, so
+/// they are not called again.
+///
+/// An answer belongs to the frame of a task that has made the call. The frame takes it when it executes the
+/// call again; it is dropped when the call fails, or the frame is left.
+#[derive(Default)]
+pub(crate) struct KeptAnswers(Vec<(TaskNumber, u32, Result<Datum, HostFailure>)>);
+
+impl KeptAnswers {
+    /// Returns whether none is kept.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Keeps the answer to a call of the frame whose base has this offset in the stack of `task`.
+    pub(crate) fn keep(&mut self, task: TaskNumber, base: u32, answer: Result<Datum, HostFailure>) {
+        self.0.push((task, base, answer));
+    }
+
+    /// Takes the answer to a call of this frame.
+    pub(crate) fn take(&mut self, task: TaskNumber, base: u32) -> Option<Result<Datum, HostFailure>> {
+        let at = self.0.iter().position(|kept| (kept.0, kept.1) == (task, base))?;
+        Some(self.0.swap_remove(at).2)
+    }
+
+    /// Drops the answers to calls of the frames of `task` from this one inward.
+    pub(crate) fn drop_from(&mut self, task: TaskNumber, base: u32) {
+        self.0.retain(|kept| kept.0 != task || kept.1 < base);
+    }
+
+    /// Drops all answers.
+    pub(crate) fn clear(&mut self) {
+        self.0.clear();
+    }
+}
+
 /// A function of the embedder's, by its place among those given to the machine. None is ever taken away.
 #[derive(Clone, Copy)]
 pub(crate) struct GivenIndex(usize);
@@ -38,8 +74,8 @@ pub(crate) struct Outside {
     pub(crate) functions: IndexMap<String, Given, BuildHasherDefault<DefaultHasher>>,
     /// Number of calls of these.
     pub(crate) calls: u64,
-    /// Answer of one of them, while there is no room for it in the heap.
-    pub(crate) answer: Option<Result<Datum, HostFailure>>,
+    /// Answers of these, while there is no room for them in the heap.
+    pub(crate) answers: KeptAnswers,
     /// The operations under way.
     pub(crate) operations: Operations,
     /// The inputs that the outside may signal, by name.
@@ -80,7 +116,7 @@ impl Outside {
             console: Console::default(),
             functions: IndexMap::default(),
             calls: 0,
-            answer: None,
+            answers: KeptAnswers::default(),
             operations: Operations::default(),
             inputs: BTreeMap::new(),
             senders: 0,
@@ -172,5 +208,31 @@ impl Drop for Outside {
         self.inbox.close_inputs();
         self.inbox.end_answers();
         self.inbox.end_inspections();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_is_taken_by_the_frame_that_has_called() {
+        let answer = |text: &str| Err(HostFailure::new("FULL", text));
+        let text = |taken: Option<Result<Datum, HostFailure>>| {
+            taken.map(|answer| format!("{:?}", answer.expect_err("it is a failure").arguments))
+        };
+        let expected = |name: &str| text(Some(answer(name)));
+        let (one, two) = (TaskNumber(1), TaskNumber(2));
+        let mut answers = KeptAnswers::default();
+        answers.keep(one, 8, answer("outer"));
+        answers.keep(one, 20, answer("inner"));
+        answers.keep(two, 20, answer("other"));
+        assert_eq!(text(answers.take(two, 8)), None);
+        // The inner frame is left.
+        answers.drop_from(one, 12);
+        assert_eq!(text(answers.take(one, 20)), None);
+        assert_eq!(text(answers.take(two, 20)), expected("other"));
+        assert_eq!(text(answers.take(one, 8)), expected("outer"));
+        assert!(answers.is_empty());
     }
 }

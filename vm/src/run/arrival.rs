@@ -13,6 +13,7 @@ use crate::outside::ExpectedOperators;
 use crate::task::{TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::input;
 
 /// Takes in the contents of the inbox, in the order in which they came. Returns whether the run is to come
 /// back to the embedder.
@@ -156,7 +157,10 @@ fn handle_signal(vm: &mut Vm, function: Value) {
 fn receive(vm: &mut Vm, name: &str, arguments: &[Datum]) {
     vm.outside.inbox.note_arrival(name);
     let Some(&input) = vm.outside.inputs.get(name) else { return };
-    let arguments = import_list(vm, arguments).unwrap_or(Value::NIL);
+    // A signal without its arguments would be another one.
+    let Some(arguments) = import_list(vm, arguments) else {
+        return input::count_dropped(&mut vm.heap, input, 1);
+    };
     allocate_without_retry(vm, |vm| signal(vm, input, arguments).map(|()| Value::NIL));
 }
 

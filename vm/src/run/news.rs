@@ -55,7 +55,8 @@ pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
     let known = vm.names.known;
     let (state, items) = match news {
         News::Progress(values) => {
-            let values = import_list(vm, &values).unwrap_or(Value::NIL);
+            // The next progress comes as a whole again.
+            let Some(values) = import_list(vm, &values) else { return };
             vm.heap.slot_set(handle, handle::PROGRESS, values);
             return signal(vm, handle);
         }

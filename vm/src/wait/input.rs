@@ -174,7 +174,8 @@ fn resize(heap: &mut Heap, input: Value, by: isize) {
     heap.slot_set(input, SIZE, Value::index(size));
 }
 
-fn count_dropped(heap: &mut Heap, input: Value, count: usize) {
+/// Counts signals of `input` that were dropped.
+pub(crate) fn count_dropped(heap: &mut Heap, input: Value, count: usize) {
     let dropped = dropped(heap, input).saturating_add(count);
     heap.slot_set(input, DROPPED, Value::index(dropped));
 }
