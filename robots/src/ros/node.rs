@@ -3,11 +3,13 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use esl_bytecode::Bytes;
 use esl_host::{HostFailure, HostInput, HostObject, IntoDatum, Keyword};
 use zenoh::Wait;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::sample::{Sample, SampleKind};
 
+use super::attachment::MessageAttachment;
 use super::graph::{GraphEvent, NodeGraph, full_name};
 use super::wire::{EndpointEntity, EndpointKind, GraphEntity, NodeEntity, QosProfile, signs_of};
 use crate::zenoh::delivery::InputDelivery;
@@ -53,7 +55,7 @@ pub(super) struct Topic {
 /// An endpoint of a node: its key, the name by which its messages tell it, and its sign of life.
 pub(super) struct Endpoint {
     pub(super) key: String,
-    pub(super) gid: [u8; 16],
+    gid: [u8; 16],
     pub(super) name: String,
     number: usize,
     endpoints: Arc<Mutex<Vec<EndpointEntity>>>,
@@ -63,6 +65,17 @@ pub(super) struct Endpoint {
 }
 
 impl Endpoint {
+    /// Returns whether its peers are behind a bridge.
+    pub(super) fn is_bridged(&self) -> bool {
+        self.sign.is_none()
+    }
+
+    /// Returns the attachment of a message with this number. A bridge takes that of a request for one of its
+    /// own, so it gets none.
+    pub(super) fn attachment(&self, number: i64) -> Option<Bytes> {
+        (!self.is_bridged()).then(|| MessageAttachment::now(number, self.gid).encode())
+    }
+
     /// Declares the sign of life. To be called when the endpoint can be reached, so that those who see it
     /// reach it.
     pub(super) async fn announce(&mut self, session: &OpenSession) -> Result<(), HostFailure> {

@@ -65,7 +65,7 @@ pub(super) async fn call(
     let name = client.endpoint.name.as_str();
     let payload = encode(&client.of_type.request, request)?;
     let number = client.sent.fetch_add(1, Ordering::Relaxed) + 1;
-    let attachment = MessageAttachment::now(number, client.endpoint.gid).encode();
+    let attachment = client.endpoint.attachment(number);
     let has_server = || node.graph().count(EndpointKind::Service, name) > 0;
     let had_server = has_server();
     let mut tries = 0;
@@ -74,9 +74,11 @@ pub(super) async fn call(
             selector: client.endpoint.key.clone(),
             payload: Some(payload.clone()),
             encoding: None,
-            attachment: Some(attachment.clone()),
+            attachment: attachment.clone(),
             timeout: None,
             is_call: true,
+            // The services of a bridge are not declared as complete.
+            asks_complete: !client.endpoint.is_bridged(),
         };
         let replies = get(&client.session, request).await?;
         tries += 1;

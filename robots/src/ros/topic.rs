@@ -110,7 +110,7 @@ impl TopicPublisher {
         let payload = encode(&self.of_type, message)?;
         note_topic(&self.name, &self.of_type, &payload);
         let number = self.sent.fetch_add(1, Ordering::Relaxed) + 1;
-        let attachment = MessageAttachment::now(number, declared.endpoint.gid).encode();
+        let attachment = declared.endpoint.attachment(number);
         let send = move || {
             let encoding = "application/cdr";
             // A session that is closed meanwhile takes nothing.

@@ -300,6 +300,7 @@ fn add_queries(rows: &mut HostRows) {
                 attachment: bytes(attachment),
                 timeout: milliseconds.map(Duration::from_millis),
                 is_call: false,
+                asks_complete: false,
             };
             let replies = get(&session, request).await?;
             Ok(replies.iter().filter_map(|reply| datum_of_reply(reply, form)).collect::<Vec<Datum>>())

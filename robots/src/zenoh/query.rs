@@ -113,8 +113,10 @@ pub(crate) struct QueryRequest {
     pub(crate) attachment: Option<Bytes>,
     /// Time after which no further replies are waited for.
     pub(crate) timeout: Option<Duration>,
-    /// Whether only those that answer for all keys are asked, and each reply counts.
+    /// Whether each reply counts, and not only the newest one for a key.
     pub(crate) is_call: bool,
+    /// Whether only those are asked that answer for all keys.
+    pub(crate) asks_complete: bool,
 }
 
 #[derive(Default)]
@@ -168,11 +170,11 @@ pub(crate) async fn get(session: &OpenSession, request: QueryRequest) -> Result<
     let token = CancellationToken::default();
     let leaving = QueryInFlight(token.clone());
     let ask = move |session: &zenoh::Session| {
-        let mut builder = session.get(request.selector).timeout(request.timeout.unwrap_or(LONGEST));
+        let target = if request.asks_complete { QueryTarget::AllComplete } else { QueryTarget::All };
+        let mut builder =
+            session.get(request.selector).timeout(request.timeout.unwrap_or(LONGEST)).target(target);
         if request.is_call {
-            builder = builder.target(QueryTarget::AllComplete).consolidation(ConsolidationMode::None);
-        } else {
-            builder = builder.target(QueryTarget::All);
+            builder = builder.consolidation(ConsolidationMode::None);
         }
         if let Some(payload) = request.payload {
             builder = builder.payload(payload).encoding(request.encoding.unwrap_or_default());

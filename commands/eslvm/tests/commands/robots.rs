@@ -392,3 +392,57 @@ fn goals_of_a_client_in_python_are_pursued_cancelled_and_aborted() {
     let cleanups = [program.line(), program.line(), program.line(), program.line()];
     assert_eq!(cleanups.map(|line| line.replace("(:CLEANUP ", "")), ["2)", "3)", "9)", "2)"]);
 }
+
+/// A program for `peers/bridge.py`, which has the keys and payloads of `zenoh-bridge-ros2dds`.
+const BRIDGED: &str = "(require :ros)
+;; A whole line at once, for a test that reads it.
+(defun say (value) (format t \"~s~%\" value) (finish-output))
+(ros:with-node (node \"executive\" :listen (format nil \"tcp/127.0.0.1:~a\" (first (command-line-arguments)))
+                               :mode :router :bridge t)
+  (let ((chatter (ros:advertise node \"/chatter\" \"std_msgs/msg/String\"))
+        (echo (ros:subscribe node \"/echo\" \"std_msgs/msg/String\"))
+        (seen nil))
+    (spawn (:daemon t)
+      (ros:with-service (node \"/multiply\" \"example_interfaces/srv/AddTwoInts\") (request)
+        (list :sum (* (getf request :a) (getf request :b)))))
+    ;; There is no graph that says when the robot has come.
+    (with-recovery-procedures ((:no-server :retries :infinite (sleep 0.1) (retry)))
+      (say (ros:call-service node \"/add_two_ints\" \"example_interfaces/srv/AddTwoInts\" :a 3 :b 4)))
+    (ros:publish chatter :data \"hello\")
+    (say (ros:field (wait-for-event echo :timeout 60) :data))
+    (say (ros:do-action node \"/fibonacci\" \"example_interfaces/action/Fibonacci\"
+                        :goal '(:order 5) :feedback (lambda (f) (push (getf f :sequence) seen))))
+    (say seen)
+    (sleep 60)))";
+
+/// The bridge declares no service as complete, and takes an attachment for one of its own.
+#[test]
+fn a_node_reaches_a_robot_behind_a_bridge() {
+    let Some(python) = python() else { return };
+    let folder = Folder::new("ros-bridged");
+    let port = free_port();
+    let program = start_program(&folder, BRIDGED, port, &[]);
+    let mut peer = start_peer(python, "bridge.py", port);
+    assert_eq!(peer.line(), "asked add_two_ints 3 4 attachment False");
+    assert_eq!(program.line(), "(:SUM 7)");
+    assert_eq!(peer.line(), "heard chatter hello attachment False");
+    assert_eq!(program.line(), "\"echo: hello\"");
+    assert_eq!(peer.line(), "goal 5");
+    assert_eq!(program.line(), "(:SEQUENCE #(0 1 5))");
+    assert_eq!(program.line(), "(#(0 1))");
+    peer.tell("call");
+    assert_eq!(peer.line(), "product 42");
+}
+
+/// `robots/tests/kill.py` checks that calls under way fail, and that all goes on with the next robot. By hand
+/// it kills a hundred of them.
+#[test]
+fn a_node_goes_on_when_its_robot_is_killed_and_comes_back() {
+    let Some(python) = python() else { return };
+    for mode in ["peer", "client"] {
+        let mut command = Command::new(python);
+        let kill = command.arg(path_of("kill.py")).arg(python).args([crate::ESLVM, "2", mode]);
+        let done = process::run(kill, "");
+        assert_eq!(done.status, Some(0), "{}\n{}", done.output, done.errors);
+    }
+}
