@@ -307,6 +307,11 @@ impl TaskHandle {
         self.result.wait()
     }
 
+    /// Returns the first value of its function, if the task has ended and it was not taken before.
+    pub fn take(&self) -> Option<Result<Data, Error>> {
+        self.result.take()
+    }
+
     /// Returns the result as a future.
     pub fn into_reply(self) -> Reply<Data> {
         self.result

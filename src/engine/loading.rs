@@ -7,11 +7,20 @@ use esl_bytecode::span::{SourceId, Span};
 use esl_compiler::reader::decode;
 use esl_vm::value::Value;
 
-use super::Engine;
+use super::{Engine, Reply};
 use crate::data::Data;
 use crate::error::Error;
 use crate::module_path::ModulePath;
 use crate::program::{self, Program};
+
+fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    std::fs::read(path)
+        .map_err(|error| Error::Unreadable { file: path.display().to_string(), reason: error.to_string() })
+}
+
+fn source_text(bytes: Vec<u8>) -> Result<String, Error> {
+    decode(SourceId::default(), bytes).map_err(|fault| Error::DoesNotCompile(vec![*fault]))
+}
 
 impl Engine {
     /// Evaluates the forms of a source file one after another, or runs a compiled file (`.eslb`). Returns the
@@ -38,16 +47,24 @@ impl Engine {
     /// [`Error::Unreadable`]; [`Error::Refused`] for a compiled file; otherwise as [`Engine::eval`].
     pub fn load(&mut self, path: impl AsRef<Path>) -> Result<Data, Error> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|error| Error::Unreadable {
-            file: path.display().to_string(),
-            reason: error.to_string(),
-        })?;
+        let bytes = read(path)?;
         program::set_module_path(&mut self.machine, &ModulePath::new([path], &[]))?;
         if path.extension().is_some_and(|extension| extension == "eslb") {
             return self.load_program(&Program::from_bytes(&bytes)?);
         }
-        let text = decode(SourceId::default(), bytes).map_err(|fault| Error::DoesNotCompile(vec![*fault]))?;
+        let text = source_text(bytes)?;
         self.eval_as(&text, Some(&path.display().to_string()))
+    }
+
+    /// Has a source file evaluated as a task of the runs to come, as [`Engine::begin`] has a text.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`]; [`Error::DoesNotCompile`] if the file is not text.
+    pub fn begin_load(&mut self, path: impl AsRef<Path>) -> Result<Reply<Data>, Error> {
+        let path = path.as_ref();
+        let text = source_text(read(path)?)?;
+        program::set_module_path(&mut self.machine, &ModulePath::new([path], &[]))?;
+        Ok(self.begin_as(&text, Some(&path.display().to_string())))
     }
 
     /// Runs a compiled program: its top-level forms, one after another. Returns the first value of the last.

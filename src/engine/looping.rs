@@ -60,9 +60,17 @@ impl Engine {
     /// Has a text evaluated as a task of the runs to come, and returns what will become of it. Unlike
     /// [`Engine::eval`], does not run anything.
     pub fn begin(&mut self, text: &str) -> Reply<Data> {
-        let text = Datum::string(text, Default::default());
-        let function = FunctionRef::Named("ESL::%EVAL-TEXT".into());
-        let question = Question::Call { function, arguments: vec![text], goes_first: false };
+        self.begin_as(text, None)
+    }
+
+    /// As [`Engine::begin`]; positions in the text are reported under the name, if there is one.
+    pub(super) fn begin_as(&mut self, text: &str, name: Option<&str>) -> Reply<Data> {
+        let arguments = std::iter::once(text).chain(name).map(|text| Datum::string(text, Default::default()));
+        let question = Question::Call {
+            function: FunctionRef::Named("ESL::%EVAL-TEXT".into()),
+            arguments: arguments.collect(),
+            goes_first: false,
+        };
         Reply::of_value(Sender::new(&self.machine.inbox()).ask(question))
     }
 

@@ -295,12 +295,20 @@ impl Engine {
 
     /// Returns the reason why an evaluation did not return.
     fn error(&mut self, error: CallError) -> Error {
-        if let CallError::Failed { message, .. } = &error
+        self.diagnose(error.into())
+    }
+
+    /// Returns an error of a text that was given to [`Engine::begin`] with its diagnostics, as
+    /// [`Engine::eval`] does: [`Error::DoesNotCompile`] in place of a failure `:COMPILATION-FAILED`. Other
+    /// errors stay.
+    #[must_use]
+    pub fn diagnose(&mut self, error: Error) -> Error {
+        if let Error::Failed { message, .. } = &error
             && let Some(diagnostics) = self.machine.take_refused(message)
         {
             return Error::DoesNotCompile(diagnostics);
         }
-        error.into()
+        error
     }
 
     /// Returns a handle, through which other threads reach the run.

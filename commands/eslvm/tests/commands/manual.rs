@@ -28,6 +28,7 @@ mod chapters {
         modules = "modules.md",
         operate = "operate.md",
         property_locks = "property-locks.md",
+        python = "python.md",
         reference = "reference.md",
         repl = "repl.md",
         replay = "replay.md",

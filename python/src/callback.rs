@@ -1,0 +1,124 @@
+//! Functions and operations that Python implements.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use esl::Data;
+use esl::engine::{Call, Failure};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
+
+use crate::failure::of_exception;
+use crate::value::{to_data, to_python};
+
+/// Returns the arguments of a call.
+fn arguments<'py>(py: Python<'py>, call: &Call) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    call.arguments().iter().map(|argument| to_python(py, argument)).collect()
+}
+
+/// Calls a function of Python for a call of the program.
+pub(crate) fn call(function: &Py<PyAny>, call: &Call) -> Result<Data, Failure> {
+    Python::attach(|py| {
+        let value = arguments(py, call)
+            .and_then(|arguments| function.bind(py).call1(PyTuple::new(py, arguments)?))
+            .and_then(|value| to_data(&value));
+        value.map_err(|error| of_exception(py, error))
+    })
+}
+
+/// Begins an operation by a function of Python.
+pub(crate) fn begin(function: &Py<PyAny>, operation: esl::engine::Operation) {
+    Python::attach(|py| {
+        let operation = Py::new(py, Operation(Mutex::new(Some(operation))));
+        let begun = operation.and_then(|operation| {
+            let begun = function.bind(py).call1((operation.clone_ref(py),));
+            begun.map(drop).map_err(|error| (operation, error)).or_else(|(operation, error)| {
+                operation.get().fail_by(py, error);
+                Ok(())
+            })
+        });
+        if let Err(error) = begun {
+            error.write_unraisable(py, Some(function.bind(py)));
+        }
+    });
+}
+
+/// Work for a task of the program, which waits for its end. It ends once, on any thread.
+#[pyclass(frozen)]
+pub(crate) struct Operation(Mutex<Option<esl::engine::Operation>>);
+
+impl Operation {
+    fn lock(&self) -> MutexGuard<'_, Option<esl::engine::Operation>> {
+        // The operation is there or not, so a panic elsewhere does not corrupt it.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn take(&self) -> PyResult<esl::engine::Operation> {
+        self.lock().take().ok_or_else(|| PyRuntimeError::new_err("the operation has ended"))
+    }
+
+    fn fail_by(&self, py: Python<'_>, error: PyErr) {
+        if let Ok(operation) = self.take() {
+            operation.fail(of_exception(py, error));
+        }
+    }
+}
+
+#[pymethods]
+impl Operation {
+    /// The arguments of the call, in the order of the lambda list's variables.
+    #[getter]
+    fn arguments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let call = self.lock().as_ref().map(|operation| operation.call().clone());
+        let call = call.ok_or_else(|| PyRuntimeError::new_err("the operation has ended"))?;
+        PyList::new(py, arguments(py, &call)?)
+    }
+
+    /// Whether the program has left the call, or cancelled the operation.
+    #[getter]
+    fn is_cancelled(&self) -> bool {
+        self.lock().as_ref().is_some_and(esl::engine::Operation::is_cancelled)
+    }
+
+    /// Ends the operation: the call returns the value.
+    #[pyo3(signature = (value = None))]
+    fn complete(&self, value: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let data = value.map_or(Ok(Data::Nil), to_data)?;
+        self.take()?.complete(data);
+        Ok(())
+    }
+
+    /// Ends the operation: the call fails with the exception.
+    fn fail(&self, py: Python<'_>, error: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.take()?.fail(of_exception(py, PyErr::from_value(error.clone())));
+        Ok(())
+    }
+
+    /// Gives the operation up: the call fails with `:OPERATION-DROPPED`, and one that was cancelled has stopped.
+    fn drop(&self) {
+        drop(self.lock().take());
+    }
+
+    /// Reports how far the operation is.
+    fn report_progress(&self, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let data = to_data(value)?;
+        if let Some(operation) = &*self.lock() {
+            operation.report_progress(data);
+        }
+        Ok(())
+    }
+
+    /// Has a function called, without arguments, when the program leaves the call; at once if it has done so.
+    fn on_cancel(&self, function: Py<PyAny>) {
+        let notice = move || {
+            Python::attach(|py| {
+                if let Err(error) = function.call0(py) {
+                    error.write_unraisable(py, Some(function.bind(py)));
+                }
+            });
+        };
+        if let Some(operation) = &*self.lock() {
+            operation.on_cancel(notice);
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Failures of programs as exceptions, and back.
+
+use esl::engine::Failure;
+use esl::host::{FailureFrame, SendError};
+use esl::{Data, Error};
+use pyo3::call::PyCallArgs;
+use pyo3::exceptions::{PyFileNotFoundError, PyRuntimeError};
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+
+use crate::value::{held, hold, to_data, to_python};
+
+/// Cause of a failure that an exception of Python is.
+const PYTHON_ERROR: &str = "PYTHON-ERROR";
+
+/// Returns an exception of `esl.errors`.
+fn exception<'py>(py: Python<'py>, class: &str, arguments: impl PyCallArgs<'py>) -> PyErr {
+    let made = py.import("esl.errors").and_then(|errors| errors.getattr(class)?.call1(arguments));
+    made.map_or_else(|error| error, PyErr::from_value)
+}
+
+/// Returns the exception of an error of an engine. An exception that a callback has raised, and nothing in the
+/// program has handled, comes back as itself.
+pub(crate) fn of_error(py: Python<'_>, error: Error) -> PyErr {
+    let message = error.to_string();
+    match error {
+        Error::Failed { cause, message, report, arguments, frames } => {
+            if cause.trim_start_matches(':') == PYTHON_ERROR
+                && let Some(raised) = arguments.get(2).and_then(|raised| held(py, raised))
+            {
+                return PyErr::from_value(raised.into_bound(py));
+            }
+            if cause == ":COMPILATION-FAILED" {
+                return exception(py, "CompileError", (message,));
+            }
+            of_failure(py, &cause, &message, &report, &arguments, &frames).unwrap_or_else(|error| error)
+        }
+        Error::DoesNotCompile(_) => exception(py, "CompileError", (message,)),
+        Error::Aborted => exception(py, "Aborted", (message,)),
+        Error::Deadlocked => exception(py, "Deadlocked", (message,)),
+        Error::BudgetSpent | Error::TicksUsed(_) => exception(py, "BudgetSpent", (message,)),
+        Error::Stopped => exception(py, "Stopped", (message,)),
+        Error::Ended => exception(py, "Ended", (message,)),
+        Error::NoMemory(_) => exception(py, "NoMemory", (message,)),
+        Error::Unreadable { .. } => PyFileNotFoundError::new_err(message),
+        _ => exception(py, "Error", (message,)),
+    }
+}
+
+fn of_failure(
+    py: Python<'_>,
+    cause: &str,
+    message: &str,
+    report: &str,
+    arguments: &[Data],
+    frames: &[FailureFrame],
+) -> PyResult<PyErr> {
+    let arguments = arguments.iter().map(|argument| to_python(py, argument)).collect::<PyResult<Vec<_>>>()?;
+    let frame = |frame: &FailureFrame| {
+        let place = frame.place.as_ref();
+        let place = place.map(|place| (place.source.clone(), place.line, place.column));
+        (frame.function.clone(), frame.task.clone(), place, frame.is_of_library)
+    };
+    let frames = PyList::new(py, frames.iter().map(frame))?;
+    Ok(exception(py, "Failure", (cause, PyList::new(py, arguments)?, message, report, frames)))
+}
+
+/// Returns the exception of a signal that was not delivered.
+pub(crate) fn of_send(py: Python<'_>, error: &SendError) -> PyErr {
+    let class = match error {
+        SendError::NoSuchInput(_) => "NoSuchInput",
+        SendError::Full(_) => "Full",
+        SendError::Ended => "Ended",
+    };
+    exception(py, class, (error.to_string(),))
+}
+
+/// Returns the failure that an exception of a callback is: an `esl.Failure` has its cause and arguments, every
+/// other exception is `:PYTHON-ERROR` with its type, its text and itself.
+pub(crate) fn of_exception(py: Python<'_>, error: PyErr) -> Failure {
+    let value = error.value(py);
+    let own = || {
+        let class = py.import("esl.errors")?.getattr("Failure")?;
+        if !value.is_instance(&class)? {
+            return Ok(None);
+        }
+        let cause: String = value.getattr("cause")?.extract()?;
+        let arguments = value.getattr("arguments")?.try_iter()?.map(|argument| to_data(&argument?));
+        let arguments = arguments.collect::<PyResult<Vec<Data>>>()?;
+        Ok::<_, PyErr>(Some(Failure::new(cause.trim_start_matches(':'), arguments)))
+    };
+    if let Ok(Some(failure)) = own() {
+        return failure;
+    }
+    let name = value.get_type().name().map(|name| name.to_string()).unwrap_or_default();
+    let text = value.str().map(|text| text.to_string()).unwrap_or_default();
+    let raised = hold(error.into_value(py).into_any());
+    Failure::new(PYTHON_ERROR, [Data::String(name), Data::String(text), raised])
+}
+
+/// Returns the exception of an engine that is in a call.
+pub(crate) fn busy() -> PyErr {
+    PyRuntimeError::new_err(
+        "the engine is in a call: it serves one thread at a time, and the functions that it calls do not call \
+         it; use a handle",
+    )
+}

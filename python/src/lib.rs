@@ -1,0 +1,34 @@
+//! The extension module of the Python package `esl-lang`: engines, their handles, operations and values.
+//!
+//! | module | content |
+//! | --- | --- |
+//! | `value` | values of programs as values of Python, and back |
+//! | `failure` | exceptions |
+//! | `engine` | engines, and driving them until an answer has come |
+//! | `callback` | functions and operations that Python implements |
+//! | `handle` | other threads, and answers to come |
+//!
+//! Guarantees: the interpreter's lock is released while a machine runs. Exceptions of a callback are failures
+//! of the call.
+//!
+//! Not here: the classes that programs in Python use, which are in `esl/` and written in Python.
+#![deny(unsafe_code)]
+
+mod callback;
+mod engine;
+mod failure;
+mod handle;
+mod value;
+
+use pyo3::prelude::*;
+
+/// The classes below those of `esl/`.
+#[pymodule(gil_used = false)]
+mod _esl {
+    #[pymodule_export]
+    use super::callback::Operation;
+    #[pymodule_export]
+    use super::engine::Engine;
+    #[pymodule_export]
+    use super::handle::{Handle, Reply, Task};
+}

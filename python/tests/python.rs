@@ -1,0 +1,72 @@
+//! The tests of the Python package, which are in Python: run by pytest, with the extension module that cargo
+//! has built.
+//!
+//! pytest comes from the Python registry, and is installed below `target/`. Where that is not possible, the
+//! tests are left out, and say so.
+#![forbid(unsafe_code)]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Packages that the tests need.
+const PACKAGES: [&str; 1] = ["pytest==8.4.2"];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Returns the Python that has the packages; nothing if they cannot be installed.
+fn python() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-venv");
+    let python = folder.join("bin/python");
+    let has_packages = || {
+        Command::new(&python).args(["-c", "import pytest"]).output().is_ok_and(|done| done.status.success())
+    };
+    if !has_packages() {
+        let venv = Command::new("python3").args(["-m", "venv"]).arg(&folder).output();
+        if venv.is_ok_and(|done| done.status.success()) {
+            let mut pip = Command::new(&python);
+            drop(pip.args(["-m", "pip", "install", "--quiet", "--timeout", "20"]).args(PACKAGES).output());
+        }
+    }
+    has_packages().then_some(python)
+}
+
+/// Returns a folder with the package, as a wheel would install it.
+fn package() -> PathBuf {
+    let test = std::env::current_exe().expect("the test is a file");
+    let library = test.ancestors().skip(1).take(2).map(|folder| folder.join("libesl_python.so"));
+    let library =
+        library.into_iter().find(|file| file.is_file()).expect("cargo builds the module for its tests");
+    let site = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-site");
+    let package = site.join("esl");
+    std::fs::create_dir_all(&package).expect("it can be made");
+    for entry in std::fs::read_dir(root().join("esl")).expect("it can be read").flatten() {
+        if entry.path().is_file() {
+            std::fs::copy(entry.path(), package.join(entry.file_name())).expect("it can be copied");
+        }
+    }
+    std::fs::copy(library, package.join("_esl.abi3.so")).expect("it can be copied");
+    site
+}
+
+#[test]
+fn python_gets_what_the_package_promises() {
+    let Some(python) = python() else {
+        eprintln!("left out: {} cannot be installed by python3", PACKAGES.join(", "));
+        return;
+    };
+    let run = Command::new(python)
+        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
+        .arg(root().join("tests"))
+        .current_dir(package())
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .expect("it is installed");
+    assert!(
+        run.status.success(),
+        "{}\n{}",
+        String::from_utf8_lossy(&run.stdout),
+        String::from_utf8_lossy(&run.stderr)
+    );
+}
