@@ -271,7 +271,7 @@ impl Engine {
     }
 
     /// Makes the descriptor unreadable, and readable again when something comes.
-    fn watch_wakeup(&self, py: Python<'_>) -> PyResult<()> {
+    fn watch_wakeup(&self) -> PyResult<()> {
         let engine = self.lock()?;
         let wakeup = self.wakeup.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(Wakeup { reader, waker }) = &*wakeup {

@@ -83,7 +83,7 @@ pub(crate) fn read(file: &Arc<str>, text: &str) -> Result<Vec<XmlElement>, TreeF
     let mut elements: Vec<XmlElement> = Vec::new();
     // The indices of the elements by the numbers of their nodes.
     let mut numbers =
-        vec![usize::MAX; document.descendants().last().map_or(1, |node| node.id().get_usize() + 1)];
+        vec![usize::MAX; document.descendants().next_back().map_or(1, |node| node.id().get_usize() + 1)];
     for node in document.descendants().filter(roxmltree::Node::is_element) {
         let place = cursor.place_of(node.range().start);
         let attributes = node.attributes().map(|attribute| Attribute {

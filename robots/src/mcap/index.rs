@@ -174,29 +174,34 @@ pub(super) fn of_summary<R: Read + Seek>(source: &mut RecordSource<R>) -> std::i
         let Ok(record) = record else { return Ok(None) };
         let body = &summary[record.start..record.end];
         let is_known = match record.opcode {
-            op::SCHEMA => record::schema(body).map(|schema| index.add_schema(schema)),
-            op::CHANNEL => record::channel(body).map(|channel| index.add_channel(channel)),
-            _ => match record::parse(record.opcode, body) {
-                Some(Record::Statistics(found)) => Some(statistics = Some(found)),
-                Some(Record::ChunkIndex(chunk)) => Some(chunks.push(chunk)),
-                Some(Record::AttachmentIndex(found)) => Some(index.attachments.push(NamedRecord {
-                    name: found.name,
-                    media_type: found.media_type,
-                    time: found.log_time,
-                    size: found.data_size,
-                    place: found.offset,
-                })),
-                Some(Record::MetadataIndex(found)) => Some(index.metadata.push(NamedRecord {
-                    name: found.name,
-                    media_type: String::new(),
-                    time: 0,
-                    size: 0,
-                    place: found.offset,
-                })),
-                found => found.map(|_| ()),
-            },
+            op::SCHEMA => record::schema(body).map(|schema| index.add_schema(schema)).is_some(),
+            op::CHANNEL => record::channel(body).map(|channel| index.add_channel(channel)).is_some(),
+            _ => {
+                let parsed = record::parse(record.opcode, body);
+                let is_known = parsed.is_some();
+                match parsed {
+                    Some(Record::Statistics(found)) => statistics = Some(found),
+                    Some(Record::ChunkIndex(chunk)) => chunks.push(chunk),
+                    Some(Record::AttachmentIndex(found)) => index.attachments.push(NamedRecord {
+                        name: found.name,
+                        media_type: found.media_type,
+                        time: found.log_time,
+                        size: found.data_size,
+                        place: found.offset,
+                    }),
+                    Some(Record::MetadataIndex(found)) => index.metadata.push(NamedRecord {
+                        name: found.name,
+                        media_type: String::new(),
+                        time: 0,
+                        size: 0,
+                        place: found.offset,
+                    }),
+                    _ => {}
+                }
+                is_known
+            }
         };
-        if is_known.is_none() {
+        if !is_known {
             return Ok(None);
         }
     }

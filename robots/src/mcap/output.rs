@@ -181,7 +181,7 @@ enum PartTarget {
     /// A thread, by the queue.
     Thread,
     /// The caller.
-    Caller(Mutex<PartWriter>),
+    Caller(Box<Mutex<PartWriter>>),
 }
 
 /// A file that is written.
@@ -213,7 +213,7 @@ impl McapOutput {
     pub fn in_memory(options: &OutputOptions) -> std::io::Result<McapOutput> {
         let sink = ByteSink::new(None);
         let writer = PartWriter::new(sink.clone(), options).map_err(std::io::Error::other)?;
-        let target = PartTarget::Caller(Mutex::new(writer));
+        let target = PartTarget::Caller(Box::new(Mutex::new(writer)));
         Ok(McapOutput { queue: Arc::default(), channels: Mutex::default(), target, sink })
     }
 

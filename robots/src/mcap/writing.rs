@@ -101,7 +101,7 @@ impl McapWriter {
         }
         let of_type = self.types().get(&channel).cloned();
         let payload = match of_type {
-            Some(of_type) => Bytes::from(encode(&of_type, message)?),
+            Some(of_type) => encode(&of_type, message)?,
             None => Payload::from_argument(message)?.0,
         };
         Ok(self.output.write(channel, times, sequence, payload))

@@ -63,7 +63,8 @@ fn list(datum: &Datum, depth: usize) -> Value {
         return datum.to_string().into();
     }
     let is_key = |item: &&&Datum| item.as_symbol().is_some_and(|symbol| symbol.is_keyword());
-    let is_plist = items.len() % 2 == 0 && items.iter().step_by(2).filter(is_key).count() * 2 == items.len();
+    let is_plist =
+        items.len().is_multiple_of(2) && items.iter().step_by(2).filter(is_key).count() * 2 == items.len();
     if is_plist {
         let name = |key: &Datum| key.as_symbol().map_or_else(String::new, |key| key.name().to_lowercase());
         let pairs = items.chunks_exact(2).map(|pair| (name(pair[0]), nested(pair[1], depth)));

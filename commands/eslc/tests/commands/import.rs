@@ -81,7 +81,7 @@ fn an_imported_program_runs_in_a_world_of_scripts() {
              (:at 20 (setf battery 1)))
   (print (handler-case (cross-door) (failure (failure) (failure-cause failure))))
   (print (list (length (world-calls 'pick-lock)) (now))))";
-    let done = process::run(&mut eslvm(&["run", "--clock", "virtual", "-"]), &format!("{program}{test}"));
+    let done = process::run(&mut eslvm(&["run", "--clock", "virtual", "-"]), format!("{program}{test}"));
     assert_eq!(done.output.replace([' ', '\n'], ""), ":IS-BATTERY-OK(420.0)", "{done:?}");
 }
 

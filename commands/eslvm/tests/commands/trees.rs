@@ -58,7 +58,7 @@ fn leaves_begin_end_and_are_halted_in_the_order_of_py_trees() {
     let expected = String::from_utf8(peer.stdout).expect("the peer writes text");
     let program = std::fs::read_to_string(path_of("programs/orders.esl")).expect("the program can be read");
     let mut command = eslvm(&["run", &format!("--allow-read={path}"), "--clock", "virtual", "-"]);
-    let found = process::run(&mut command, &format!("{program}(main \"{path}\" {TREES})"));
+    let found = process::run(&mut command, format!("{program}(main \"{path}\" {TREES})"));
     let found = found.quiet_output().expect("the program runs");
     let mut number_of_events = 0;
     for (number, (expected, found)) in expected.lines().zip(found.lines()).enumerate() {
