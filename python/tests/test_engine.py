@@ -190,9 +190,14 @@ def test_an_interrupt_runs_the_cleanups(engine):
     def motors_off():
         ended.append(True)
 
-    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
-    with pytest.raises(KeyboardInterrupt):
-        engine.eval("(unwind-protect (loop) (motors-off))")
+    # A shell has its background jobs ignore the signal, and Python leaves it so.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            engine.eval("(unwind-protect (loop) (motors-off))")
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert ended == [True]
 
 
