@@ -10,7 +10,7 @@ CHAPTER = pathlib.Path(__file__).parents[2] / "docs" / "manual" / "python.md"
 
 def test_examples():
     names = {}
-    examples = re.findall(r"```python\n(.*?)```\n```\n(.*?)```", CHAPTER.read_text(), re.S)
+    examples = re.findall(r"```python\n(.*?)```\n```text\n(.*?)```", CHAPTER.read_text(), re.S)
     assert len(examples) == 4
     for code, expected in examples:
         printed = io.StringIO()
