@@ -104,7 +104,10 @@ fn the_programs_of_the_manual_run() {
         let file = library_folder().join(format!("capi-manual.{language}"));
         std::fs::write(&file, program.expect("the chapter has a program")).expect("it can be written");
         let file = file.to_str().expect("it is text");
-        assert_eq!(output(file, compiler, &[]).as_deref(), Some(expected), "{language}");
+        match output(file, compiler, &[]) {
+            Some(text) => assert_eq!(text, expected),
+            None => say_left_out(&format!("a compiler for {language} is not installed")),
+        }
     }
 }
 
@@ -115,8 +118,12 @@ fn c_gets_what_the_header_promises() {
 
 #[test]
 fn cpp_gets_what_the_header_promises() {
-    assert_eq!(output("tests/api.cpp", &CPP, &[]).as_deref(), Some("0 faults\n"));
-    assert_eq!(output("tests/api.cpp", &SANITIZED, &[]).as_deref(), Some("0 faults\n"));
+    for compiler in [&CPP[..], &SANITIZED] {
+        match output("tests/api.cpp", compiler, &[]) {
+            Some(text) => assert_eq!(text, "0 faults\n"),
+            None => say_left_out("a compiler for C++ is not installed"),
+        }
+    }
 }
 
 #[test]
