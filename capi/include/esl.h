@@ -838,8 +838,8 @@ bool esl_operation_is_cancelled(const esl_operation *operation);
 
 /**
  * Has `function` called when the program leaves the call, or cancels the operation; at once if it has done
- * so already. The program waits until the operation has ended or is freed, so that what is still moving is not
- * commanded again.
+ * so already. The program waits until the operation has ended or is freed, so that what is still moving is
+ * not commanded again.
  *
  * The caller sees to it that
  * `operation` is an operation that has not ended; `function` and `destructor` can be called with `user` on
@@ -984,8 +984,8 @@ esl_value *esl_vector(const esl_value *const *items, size_t count);
  * Reads a value as programs write it: "(at ?robot (3.5 :north))".
  *
  * The caller sees to it that
- * `text` is a text with a null character at its end; `value` and `failure` are places that can be written, or
- * null.
+ * `text` is a text with a null character at its end; `value` and `failure` are places that can be written,
+ * or null.
  */
 esl_status esl_value_read(const char *text, esl_value **value, esl_failure **failure);
 

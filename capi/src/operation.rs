@@ -161,8 +161,8 @@ pub unsafe extern "C" fn esl_operation_is_cancelled(operation: *const esl_operat
 }
 
 /// Has `function` called when the program leaves the call, or cancels the operation; at once if it has done
-/// so already. The program waits until the operation has ended or is freed, so that what is still moving is not
-/// commanded again.
+/// so already. The program waits until the operation has ended or is freed, so that what is still moving is
+/// not commanded again.
 ///
 /// # Safety
 /// `operation` is an operation that has not ended; `function` and `destructor` can be called with `user` on
@@ -175,7 +175,8 @@ pub unsafe extern "C" fn esl_operation_on_cancel(
     destructor: esl_destructor,
 ) -> esl_status {
     let user = UserData::new(user, destructor);
-    // SAFETY: each pointer is null, or to what C holds and lends; `function` gets the pointer that came with it.
+    // SAFETY: each pointer is null, or to what C holds and lends; `function` gets the pointer that came with
+    // it.
     unsafe {
         guarded(ptr::null_mut(), || {
             let function = function.ok_or_else(no_callback)?;

@@ -215,8 +215,8 @@ pub unsafe extern "C" fn esl_vector(items: *const *const esl_value, count: usize
 /// Reads a value as programs write it: "(at ?robot (3.5 :north))".
 ///
 /// # Safety
-/// `text` is a text with a null character at its end; `value` and `failure` are places that can be written, or
-/// null.
+/// `text` is a text with a null character at its end; `value` and `failure` are places that can be written,
+/// or null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn esl_value_read(
     text: *const c_char,

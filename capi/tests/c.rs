@@ -1,5 +1,5 @@
-//! Programs in C and C++ against the library: compiled by the system's compilers, and watched by valgrind if it is
-//! there.
+//! Programs in C and C++ against the library: compiled by the system's compilers, and watched by valgrind if
+//! it is there.
 #![forbid(unsafe_code)]
 
 use std::path::{Path, PathBuf};

@@ -94,7 +94,8 @@ impl Operation {
         Ok(())
     }
 
-    /// Gives the operation up: the call fails with `:OPERATION-DROPPED`, and one that was cancelled has stopped.
+    /// Gives the operation up: the call fails with `:OPERATION-DROPPED`, and one that was cancelled has
+    /// stopped.
     fn drop(&self) {
         drop(self.lock().take());
     }

@@ -39,8 +39,9 @@ impl Wake for Bell {
     }
 }
 
-/// A pair of sockets of which one becomes readable when the engine has something to do, so that an event loop of
-/// Python waits for it. A function of Python would have to wait for the interpreter, under a lock of the machine.
+/// A pair of sockets of which one becomes readable when the engine has something to do, so that an event loop
+/// of Python waits for it. A function of Python would have to wait for the interpreter, under a lock of the
+/// machine.
 struct Wakeup {
     reader: UnixStream,
     waker: Waker,

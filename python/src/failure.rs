@@ -19,8 +19,8 @@ fn exception<'py>(py: Python<'py>, class: &str, arguments: impl PyCallArgs<'py>)
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
-/// Returns the exception of an error of an engine. An exception that a callback has raised, and nothing in the
-/// program has handled, comes back as itself.
+/// Returns the exception of an error of an engine. An exception that a callback has raised, and nothing in
+/// the program has handled, comes back as itself.
 pub(crate) fn of_error(py: Python<'_>, error: Error) -> PyErr {
     let message = error.to_string();
     match error {
@@ -75,8 +75,8 @@ pub(crate) fn of_send(py: Python<'_>, error: &SendError) -> PyErr {
     exception(py, class, (error.to_string(),))
 }
 
-/// Returns the failure that an exception of a callback is: an `esl.Failure` has its cause and arguments, every
-/// other exception is `:PYTHON-ERROR` with its type, its text and itself.
+/// Returns the failure that an exception of a callback is: an `esl.Failure` has its cause and arguments,
+/// every other exception is `:PYTHON-ERROR` with its type, its text and itself.
 pub(crate) fn of_exception(py: Python<'_>, error: PyErr) -> Failure {
     let value = error.value(py);
     let own = || {

@@ -47,6 +47,14 @@ fn packages() -> impl Iterator<Item = PathBuf> {
     SECTIONS.iter().map(|(_, folder)| root().join(folder)).chain(tools)
 }
 
+/// Packages for other languages, whose types have the names that they have there.
+const BINDINGS: [&str; 2] = ["capi", "python"];
+
+/// Returns the folders of the sources of all packages in the code map, and of those for other languages.
+fn all_packages() -> impl Iterator<Item = PathBuf> {
+    packages().chain(BINDINGS.iter().map(|name| root().join(name).join("src")))
+}
+
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -215,7 +223,7 @@ const COLUMNS: usize = 110;
 #[test]
 fn comments_are_as_narrow_as_code() {
     let mut wide = Vec::new();
-    for folder in packages() {
+    for folder in all_packages() {
         let parts = [folder.clone(), folder.with_file_name("tests")];
         for path in parts.into_iter().filter(|part| part.is_dir()).flat_map(sources) {
             let text = fs::read_to_string(&path).expect("a source can be read");
@@ -364,7 +372,7 @@ fn error_types(text: &str) -> Vec<&str> {
 #[test]
 fn errors_have_types() {
     let others = ["stdlib", "playground", "benches", "fuzz"].map(|folder| root().join(folder));
-    let folders = packages().chain(others);
+    let folders = all_packages().chain(others);
     let mut found = BTreeSet::new();
     for path in folders.flat_map(product_sources) {
         let text = fs::read_to_string(&path).expect("a source can be read");
