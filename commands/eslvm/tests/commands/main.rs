@@ -69,6 +69,7 @@ mod traces;
 mod transcripts;
 mod trees;
 mod tutorial;
+mod venv;
 #[cfg(unix)]
 mod world;
 #[cfg(unix)]

@@ -8,15 +8,14 @@ use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::OnceLock;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use esl_conformance::folder::Folder;
 use esl_conformance::process;
 
-use crate::eslvm;
 use crate::examples::free_port;
+use crate::{eslvm, venv};
 
 const PACKAGE: &str = "pymavlink==2.4.50";
 
@@ -27,31 +26,9 @@ fn path_of(name: &str) -> PathBuf {
     esl_conformance::root().join("robots/tests").join(name)
 }
 
-/// Returns the Python that has the package, which is installed by the first call; nothing if it cannot be.
-fn python() -> Option<&'static Path> {
-    static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let install = || {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mavlink-venv");
-        let python = folder.join("bin/python");
-        let has_package = || {
-            let import = Command::new(&python).args(["-c", "import pymavlink"]).output();
-            import.is_ok_and(|done| done.status.success())
-        };
-        if has_package() {
-            return Some(python);
-        }
-        let venv = Command::new("python3").args(["-m", "venv"]).arg(&folder).output();
-        if venv.is_ok_and(|done| done.status.success()) {
-            let mut pip = Command::new(&python);
-            drop(pip.args(["-m", "pip", "install", "--quiet", "--timeout", "20", PACKAGE]).output());
-        }
-        has_package().then_some(python)
-    };
-    let python = PYTHON.get_or_init(install).as_deref();
-    if python.is_none() {
-        crate::say_left_out(&format!("{PACKAGE} cannot be installed by python3"));
-    }
-    python
+/// Returns the Python that has the packages; nothing if they cannot be installed.
+fn python() -> Option<PathBuf> {
+    venv::python("mavlink", &[PACKAGE], "import pymavlink")
 }
 
 /// A process that ends with this, and its lines.
@@ -110,7 +87,7 @@ fn beside_vehicle(
     let python = python()?;
     folder.file("main.esl", text);
     let port = free_port().to_string();
-    let vehicle = start_peer(python, "mavlink_vehicle.py", &[&[port.as_str()], options].concat());
+    let vehicle = start_peer(&python, "mavlink_vehicle.py", &[&[port.as_str()], options].concat());
     let run = ["run", "--allow-net=127.0.0.1", "--record", "run.eslj", "main.esl", &port];
     let done = process::run(eslvm(&run).current_dir(folder.path()), "");
     let lines = done.output.lines().map(str::trim).filter(|line| !line.is_empty());
@@ -230,7 +207,7 @@ fn a_station_of_pymavlink_flies_a_vehicle_in_esl() {
     let mut run = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &port]);
     let vehicle = Running::start(run.current_dir(folder.path()));
     assert_eq!(vehicle.line(), "open");
-    let station = start_peer(python, "mavlink_station.py", &[&port]);
+    let station = start_peer(&python, "mavlink_station.py", &[&port]);
     for expected in [
         "heartbeat 1 0 2 3",
         "armed",

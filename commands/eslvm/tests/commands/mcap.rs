@@ -7,44 +7,20 @@
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use esl_conformance::folder::Folder;
 use esl_conformance::process;
 
-use crate::eslvm;
+use crate::{eslvm, venv};
 
 /// Packages of the peers.
 const PACKAGES: [&str; 4] =
     ["mcap==1.6.0", "mcap-ros2-support==0.6.0", "rosbags==0.11.9", "websockets==17.4"];
 
-/// Returns the Python that has the packages, which are installed by the first call; nothing if they cannot
-/// be.
-fn python() -> Option<&'static Path> {
-    static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let install = || {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mcap-venv");
-        let python = folder.join("bin/python");
-        let has_packages = || {
-            let import = ["-c", "import mcap, mcap_ros2, rosbags, websockets"];
-            Command::new(&python).args(import).output().is_ok_and(|done| done.status.success())
-        };
-        if has_packages() {
-            return Some(python);
-        }
-        let venv = Command::new("python3").args(["-m", "venv"]).arg(&folder).output();
-        if venv.is_ok_and(|done| done.status.success()) {
-            let mut pip = Command::new(&python);
-            drop(pip.args(["-m", "pip", "install", "--quiet", "--timeout", "20"]).args(PACKAGES).output());
-        }
-        has_packages().then_some(python)
-    };
-    let python = PYTHON.get_or_init(install).as_deref();
-    if python.is_none() {
-        crate::say_left_out(&format!("{} cannot be installed by python3", PACKAGES.join(", ")));
-    }
-    python
+/// Returns the Python that has the packages; nothing if they cannot be installed.
+fn python() -> Option<PathBuf> {
+    venv::python("mcap", &PACKAGES, "import mcap, mcap_ros2, rosbags, websockets")
 }
 
 /// Has the peer do something with a path in a folder; returns the lines that it prints.
@@ -95,7 +71,7 @@ fn files_of_a_program_are_read_by_the_library_of_others() {
         let done = run(&folder, &["run", "--clock", clock, "main.esl"]);
         assert_eq!((done.status, &*done.errors), (Some(0), ""), "{}", done.output);
         for name in ["zstd", "lz4", "none", "loose"] {
-            let read = peer(python, &folder, "read", &format!("{name}.mcap"));
+            let read = peer(&python, &folder, "read", &format!("{name}.mcap"));
             assert_eq!(read[0], "header ros2 esl");
             assert_eq!(
                 read[1],
@@ -128,7 +104,7 @@ const READER: &str = "(require :mcap)
 fn files_of_others_are_read_in_every_form() {
     let Some(python) = python() else { return };
     let folder = Folder::with("mcap-read", &[("main.esl", READER)]);
-    peer(python, &folder, "write", ".");
+    peer(&python, &folder, "write", ".");
     for clock in ["real", "virtual"] {
         for name in ["zstd", "lz4", "none", "loose", "bare", "nosums"] {
             let file = format!("{name}.mcap");
@@ -213,7 +189,7 @@ const BAG_TESTS: &str = "(require :ros)
 fn a_recorded_robot_is_a_test() {
     let Some(python) = python() else { return };
     let folder = Folder::with("mcap-bag", &[("tests/bag_test.esl", BAG_TESTS)]);
-    peer(python, &folder, "bag", "tests/bag");
+    peer(&python, &folder, "bag", "tests/bag");
     // From another folder than that of the file.
     let done = run(&folder, &["test", "tests/bag_test.esl"]);
     assert_eq!(done.status, Some(0), "{}\n{}", done.output, done.errors);
@@ -314,7 +290,7 @@ fn a_run_is_a_file_that_others_read() {
     let arguments = ["run", "--clock", "virtual", "--mcap", "run.mcap", "--record", "run.eslj", "main.esl"];
     let done = run(&folder, &arguments);
     assert_eq!(done.status, Some(0), "{}", done.errors);
-    let read = peer(python, &folder, "read", "run.mcap");
+    let read = peer(&python, &folder, "read", "run.mcap");
     let has = |topic: &str, parts: &[&str]| {
         let is_it =
             |line: &&String| line.starts_with(&format!("{topic} ")) && parts.iter().all(|p| line.contains(p));

@@ -8,15 +8,14 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::OnceLock;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use esl_conformance::folder::Folder;
 use esl_conformance::process;
 
-use crate::eslvm;
 use crate::examples::free_port;
+use crate::{eslvm, venv};
 
 /// Packages that the peers need.
 const PACKAGES: [&str; 2] = ["eclipse-zenoh==1.10.2", "zenoh-ros2-sdk==0.1.8"];
@@ -28,32 +27,9 @@ fn path_of(name: &str) -> PathBuf {
     esl_conformance::root().join("robots/tests").join(name)
 }
 
-/// Returns the Python that has the packages, which are installed by the first call; nothing if they cannot
-/// be.
-pub(crate) fn python() -> Option<&'static Path> {
-    static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let install = || {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("robots-venv");
-        let python = folder.join("bin/python");
-        let has_packages = || {
-            let import = ["-c", "import zenoh, zenoh_ros2_sdk"];
-            Command::new(&python).args(import).output().is_ok_and(|done| done.status.success())
-        };
-        if has_packages() {
-            return Some(python);
-        }
-        let venv = Command::new("python3").args(["-m", "venv"]).arg(&folder).output();
-        if venv.is_ok_and(|done| done.status.success()) {
-            let mut pip = Command::new(&python);
-            drop(pip.args(["-m", "pip", "install", "--quiet", "--timeout", "20"]).args(PACKAGES).output());
-        }
-        has_packages().then_some(python)
-    };
-    let python = PYTHON.get_or_init(install).as_deref();
-    if python.is_none() {
-        crate::say_left_out(&format!("{} cannot be installed by python3", PACKAGES.join(", ")));
-    }
-    python
+/// Returns the Python that has the packages; nothing if they cannot be installed.
+pub(crate) fn python() -> Option<PathBuf> {
+    venv::python("robots", &PACKAGES, "import zenoh, zenoh_ros2_sdk")
 }
 
 /// A process that ends with this.
@@ -250,7 +226,7 @@ fn a_node_talks_to_a_node_in_python_both_ways() {
     let folder = Folder::new("ros-talker");
     let port = free_port();
     let mut program = start_program(&folder, TALKER, port, &[]);
-    let mut peer = start_peer(python, "node.py", port);
+    let mut peer = start_peer(&python, "node.py", port);
     assert_eq!(program.line(), "\"echo: hello\"");
     assert_eq!(program.line(), "(:SUM 7)");
     let refused = program.line();
@@ -316,7 +292,7 @@ fn a_goal_is_pursued_by_a_server_in_python_and_cancelled_when_it_is_left() {
     let folder = Folder::new("ros-goals");
     let port = free_port();
     let program = start_program(&folder, GOALS, port, &[]);
-    let peer = start_peer(python, "action_server.py", port);
+    let peer = start_peer(&python, "action_server.py", port);
     let result = "(:SEQUENCE #(0 1 1))";
     assert_eq!(program.line(), "(1 (:GOAL-REJECTED \"/fibonacci\") NIL 0)");
     assert_eq!(program.line(), format!("(2 {result} (2 3) 0)"));
@@ -363,7 +339,7 @@ fn goals_of_a_client_in_python_are_pursued_cancelled_and_aborted() {
     let folder = Folder::new("ros-pursuer");
     let port = free_port();
     let program = start_program(&folder, PURSUER, port, &[]);
-    let mut peer = start_peer(python, "action_client.py", port);
+    let mut peer = start_peer(&python, "action_client.py", port);
     let ask = |peer: &mut Running, line: &str, answers: &[&str]| {
         peer.tell(line);
         let heard: Vec<String> = answers.iter().map(|_| peer.line()).collect();
@@ -422,7 +398,7 @@ fn a_node_reaches_a_robot_behind_a_bridge() {
     let folder = Folder::new("ros-bridged");
     let port = free_port();
     let program = start_program(&folder, BRIDGED, port, &[]);
-    let mut peer = start_peer(python, "bridge.py", port);
+    let mut peer = start_peer(&python, "bridge.py", port);
     assert_eq!(peer.line(), "asked add_two_ints 3 4 attachment False");
     assert_eq!(program.line(), "(:SUM 7)");
     assert_eq!(peer.line(), "heard chatter hello attachment False");
@@ -440,8 +416,8 @@ fn a_node_reaches_a_robot_behind_a_bridge() {
 fn a_node_goes_on_when_its_robot_is_killed_and_comes_back() {
     let Some(python) = python() else { return };
     for mode in ["peer", "client"] {
-        let mut command = Command::new(python);
-        let kill = command.arg(path_of("kill.py")).arg(python).args([crate::ESLVM, "2", mode]);
+        let mut command = Command::new(&python);
+        let kill = command.arg(path_of("kill.py")).arg(&python).args([crate::ESLVM, "2", mode]);
         let done = process::run(kill, "");
         assert_eq!(done.status, Some(0), "{}\n{}", done.output, done.errors);
     }

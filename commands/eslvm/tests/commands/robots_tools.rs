@@ -47,7 +47,7 @@ fn time_is_that_of_a_simulator() {
     let folder = Folder::new("ros-clock");
     let port = free_port();
     let mut program = start_program(&folder, &format!("{SAY}{TIMED}"), port, &["--clock", "ros"]);
-    let mut peer = start_peer(python, "robot.py", port);
+    let mut peer = start_peer(&python, "robot.py", port);
     // Without a message, time stands still, and the program says so.
     assert_eq!(program.line(), "(:PARAMETER T (0 0))");
     assert_eq!(program.line(), "(:EVENT :NO-CLOCK)");
@@ -124,7 +124,7 @@ fn transforms_of_nodes_in_python_are_looked_up() {
     let folder = Folder::new("ros-transforms");
     let port = free_port();
     let program = start_program(&folder, &format!("{SAY}{SEEKER}"), port, &[]);
-    let mut peer = start_peer(python, "robot.py", port);
+    let mut peer = start_peer(&python, "robot.py", port);
     peer.tell("static base gripper 10");
     peer.tell("transform map base 100 0 1");
     assert_eq!(program.line(), "11.0");
@@ -165,7 +165,7 @@ fn a_node_is_managed_watched_and_followed_by_tools_in_python() {
     let folder = Folder::new("ros-managed");
     let port = free_port();
     let program = start_program(&folder, &format!("{SAY}{MANAGED}"), port, &[]);
-    let mut peer = start_peer(python, "robot.py", port);
+    let mut peer = start_peer(&python, "robot.py", port);
     let ask = |peer: &mut Running, line: &str, answer: &str| {
         peer.tell(line);
         // Statuses come in between, each half second.

@@ -4,13 +4,13 @@
 //! not possible, the test is left out, and says so.
 #![cfg(unix)]
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 use esl_conformance::folder::Folder;
 use esl_conformance::process;
 
-use crate::eslvm;
+use crate::{eslvm, venv};
 
 const PACKAGE: &str = "py_trees==2.6.0";
 
@@ -22,26 +22,9 @@ fn path_of(name: &str) -> PathBuf {
     esl_conformance::root().join("trees/tests").join(name)
 }
 
-/// Returns the Python that has the package, which is installed if need be; nothing if it cannot be.
+/// Returns the Python that has the packages; nothing if they cannot be installed.
 fn python() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("trees-venv");
-    let python = folder.join("bin/python");
-    let has_package = || {
-        let import = ["-c", "import py_trees"];
-        Command::new(&python).args(import).output().is_ok_and(|done| done.status.success())
-    };
-    if !has_package() {
-        let venv = Command::new("python3").args(["-m", "venv"]).arg(&folder).output();
-        if venv.is_ok_and(|done| done.status.success()) {
-            let mut pip = Command::new(&python);
-            drop(pip.args(["-m", "pip", "install", "--quiet", "--timeout", "20", PACKAGE]).output());
-        }
-    }
-    let has_package = has_package();
-    if !has_package {
-        crate::say_left_out(&format!("{PACKAGE} cannot be installed by python3"));
-    }
-    has_package.then_some(python)
+    venv::python("trees", &[PACKAGE], "import py_trees")
 }
 
 #[test]

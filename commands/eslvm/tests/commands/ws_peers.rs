@@ -5,14 +5,14 @@
 //! possible, these tests are left out, and say so.
 
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
-use std::sync::OnceLock;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use esl_conformance::folder::Folder;
 
+use crate::venv;
 use crate::ws::{run, start_server};
 
 /// Packages that the peers need.
@@ -83,32 +83,9 @@ fn script(name: &str) -> PathBuf {
     esl_conformance::root().join("commands/eslvm/tests/peers").join(name)
 }
 
-/// Returns the Python that has the packages, which are installed by the first call; nothing if they cannot
-/// be.
-pub(crate) fn python() -> Option<&'static Path> {
-    static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let install = || {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("websocket-venv");
-        let python = folder.join("bin/python");
-        let has_packages = || {
-            let import = ["-c", "import websockets, roslibpy"];
-            Command::new(&python).args(import).output().is_ok_and(|done| done.status.success())
-        };
-        if has_packages() {
-            return Some(python);
-        }
-        let venv = Command::new("python3").args(["-m", "venv"]).arg(&folder).output();
-        if venv.is_ok_and(|done| done.status.success()) {
-            let mut pip = Command::new(&python);
-            drop(pip.args(["-m", "pip", "install", "--quiet", "--timeout", "20"]).args(PACKAGES).output());
-        }
-        has_packages().then_some(python)
-    };
-    let python = PYTHON.get_or_init(install).as_deref();
-    if python.is_none() {
-        crate::say_left_out(&format!("{} cannot be installed by python3", PACKAGES.join(", ")));
-    }
-    python
+/// Returns the Python that has the packages; nothing if they cannot be installed.
+pub(crate) fn python() -> Option<PathBuf> {
+    venv::python("websocket", &PACKAGES, "import websockets, roslibpy")
 }
 
 /// Starts a server of `websockets`; returns its port.
