@@ -9,7 +9,7 @@ use esl_vm::embed::{ExportError, LibraryError};
 use esl_vm::load::LoadError;
 use esl_vm::run::CallError;
 
-use crate::data::Data;
+use crate::data::{Data, MAX_DEPTH};
 
 /// Reason why an evaluation returned no value, or a program could not be begun.
 ///
@@ -81,6 +81,8 @@ pub enum Error {
     },
     /// The engine that was asked is gone.
     Ended,
+    /// The value has lists or vectors more than [`MAX_DEPTH`](crate::data::MAX_DEPTH) levels deep.
+    NestedTooDeeply,
     /// The value cannot become [`Data`].
     NotData(ExportError),
     /// The name cannot be that of a function.
@@ -112,6 +114,9 @@ impl fmt::Display for Error {
             }
             Error::NotOfType { value, expected } => write!(f, "the value {value} is not of type {expected}"),
             Error::Unreadable { file, reason } => write!(f, "`{file}` cannot be read: {reason}"),
+            Error::NestedTooDeeply => {
+                write!(f, "the value has more than {MAX_DEPTH} levels of lists or vectors within each other")
+            }
             Error::Ended => f.write_str("the engine is gone"),
             Error::Refused(error) => error.fmt(f),
             Error::NotData(error) => error.fmt(f),

@@ -56,7 +56,7 @@ impl esl_status {
             Error::BudgetSpent | Error::TicksUsed(_) => ESL_BUDGET_SPENT,
             Error::Stopped => ESL_STOPPED,
             Error::NoMemory(_) => ESL_NO_MEMORY,
-            Error::NotOfType { .. } | Error::NotData(_) => ESL_NOT_OF_TYPE,
+            Error::NotOfType { .. } | Error::NotData(_) | Error::NestedTooDeeply => ESL_NOT_OF_TYPE,
             Error::Refused(_) | Error::Unreadable { .. } => ESL_UNREADABLE,
             Error::Ended => ESL_ENDED,
             _ => ESL_INVALID_ARGUMENT,

@@ -36,6 +36,9 @@ pub use esl_bytecode::Bytes;
 pub use esl_bytecode::packed::PackedVector;
 pub use opaque::{HostType, Opaque};
 
+/// Most levels of lists and vectors within each other: data are walked by recursion.
+pub const MAX_DEPTH: usize = 1000;
+
 /// A value from a program, or for one.
 ///
 /// ```
@@ -189,8 +192,30 @@ impl Data {
         Datum::new(kind, span)
     }
 
-    /// Returns a datum of the machine as Rust sees it.
+    /// Returns a datum of the machine as Rust sees it. A list or vector more than [`MAX_DEPTH`] levels deep
+    /// is the string `#`, as the printer has it for levels that it leaves out.
     pub fn from_datum(datum: &Datum) -> Data {
+        Data::within(datum, MAX_DEPTH, &mut false)
+    }
+
+    /// Returns a datum of the machine as Rust sees it.
+    ///
+    /// # Errors
+    /// [`Error::NestedTooDeeply`].
+    pub(crate) fn whole(datum: &Datum) -> Result<Data, Error> {
+        let mut is_cut = false;
+        let data = Data::within(datum, MAX_DEPTH, &mut is_cut);
+        if is_cut { Err(Error::NestedTooDeeply) } else { Ok(data) }
+    }
+
+    /// Returns a datum with this number of levels, and sets `is_cut` if it has more.
+    fn within(datum: &Datum, levels: usize, is_cut: &mut bool) -> Data {
+        let is_compound =
+            matches!(datum.kind(), DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..));
+        let Some(levels) = levels.checked_sub(usize::from(is_compound)) else {
+            *is_cut = true;
+            return Data::String("#".into());
+        };
         match datum.kind() {
             DatumKind::Nil => Data::Nil,
             DatumKind::Symbol(symbol) if symbol.is_cl("T") => Data::True,
@@ -205,17 +230,18 @@ impl Data {
             DatumKind::Character(value) => Data::Character(*value),
             DatumKind::String(value) => Data::String(value.to_string()),
             DatumKind::Vector(items) | DatumKind::Array(_, items) => {
-                Data::Vector(items.iter().map(Data::from_datum).collect())
+                Data::Vector(items.iter().map(|item| Data::within(item, levels, is_cut)).collect())
             }
             DatumKind::Packed(vector) => Data::Packed(vector.clone()),
             DatumKind::Opaque(opaque) => Data::Opaque(opaque.clone()),
             DatumKind::Object(_) | DatumKind::Call(_) => Data::String(datum.to_string()),
             DatumKind::Cons(..) => {
                 let mut elements = datum.elements();
-                let items: Vec<Data> = elements.by_ref().map(Data::from_datum).collect();
+                let items: Vec<Data> =
+                    elements.by_ref().map(|item| Data::within(item, levels, is_cut)).collect();
                 match elements.tail().kind() {
                     DatumKind::Nil => Data::List(items),
-                    _ => Data::DottedList(items, Box::new(Data::from_datum(elements.tail()))),
+                    _ => Data::DottedList(items, Box::new(Data::within(elements.tail(), levels, is_cut))),
                 }
             }
         }
@@ -249,7 +275,7 @@ impl FromStr for Data {
         let (datum, end) = next(0)?;
         let fault = match datum {
             None => code::MISSING_DATUM.at(span(0), "expected a value"),
-            Some(datum) if next(end)?.0.is_none() => return Ok(Data::from_datum(&datum)),
+            Some(datum) if next(end)?.0.is_none() => return Data::whole(&datum),
             Some(_) => code::INVALID_TOKEN.at(span(end), "expected the end of the text after one value"),
         };
         Err(Error::DoesNotCompile(vec![fault]))

@@ -3,10 +3,12 @@
 use std::any::Any;
 use std::sync::Arc;
 
+use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_host as host;
 
 use crate::data::{Data, FromData};
+use crate::error::Error;
 
 /// A failure of a function of the embedder's, which the program sees at the call.
 ///
@@ -50,6 +52,15 @@ impl Failure {
     pub(super) fn of_panic(panic: &(dyn Any + Send)) -> Failure {
         let failure = host::HostFailure::of_panic(panic);
         Failure::new(failure.cause, failure.arguments.iter().map(Data::from_datum))
+    }
+
+    /// Returns the arguments of a call, or its failure if they cannot be data.
+    ///
+    /// # Errors
+    /// A failure `:NESTED-TOO-DEEPLY`.
+    pub(super) fn of_arguments(arguments: &[Datum]) -> Result<Vec<Data>, Failure> {
+        let whole: Result<Vec<Data>, Error> = arguments.iter().map(Data::whole).collect();
+        whole.map_err(|error| Failure::new("NESTED-TOO-DEEPLY", [Data::String(error.to_string())]))
     }
 
     pub(super) fn to_host(&self) -> host::HostFailure {

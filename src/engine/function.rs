@@ -90,7 +90,7 @@ impl Engine {
         let result = self.machine.call(values[0], &values[1..], self.ticks);
         values.into_iter().for_each(|value| self.machine.unpin(value));
         let value = self.first_value(result)?;
-        let value = Data::from_datum(&self.machine.export(value)?);
+        let value = Data::whole(&self.machine.export(value)?)?;
         T::from_data(&value).ok_or_else(|| Error::NotOfType { value: value.to_string(), expected: T::TYPE })
     }
 }

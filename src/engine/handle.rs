@@ -260,7 +260,7 @@ fn error_of(answer: Answer) -> Error {
 pub(super) fn read_value<T: FromData>(answer: Answer) -> Result<T, Error> {
     match answer {
         Answer::Values(values) => {
-            let value = values.first().map_or(Data::Nil, Data::from_datum);
+            let value = values.first().map_or(Ok(Data::Nil), Data::whole)?;
             T::from_data(&value).ok_or(Error::NotOfType { value: value.to_string(), expected: T::TYPE })
         }
         answer => Err(error_of(answer)),

@@ -90,13 +90,13 @@ impl Engine {
         let result = self.machine.call(function, &[functions], self.ticks);
         self.machine.unpin(functions);
         let value = self.first_value(result)?;
-        Ok(Data::from_datum(&self.machine.export(value)?))
+        Data::whole(&self.machine.export(value)?)
     }
 
     /// Evaluates the forms of a text, which positions in it are reported under a name for, if it has one.
     pub(super) fn eval_as(&mut self, text: &str, name: Option<&str>) -> Result<Data, Error> {
         let value = self.value_of(text, name)?;
-        Ok(Data::from_datum(&self.machine.export(value)?))
+        Data::whole(&self.machine.export(value)?)
     }
 
     /// Evaluates the forms of a text and returns the first value of the last form.

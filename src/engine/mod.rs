@@ -120,10 +120,11 @@ impl Engine {
     {
         self.define_by(name, lambda_list, documentation, false, |names| {
             HostFunction::AtOnce(Box::new(move |arguments| {
-                let arguments = arguments.iter().map(Data::from_datum).collect();
-                let call = Call { names: names.clone(), arguments };
-                let result = catch_unwind(AssertUnwindSafe(|| function(call)));
-                let result = result.unwrap_or_else(|panic| Err(Failure::of_panic(&*panic)));
+                let result = Failure::of_arguments(arguments).and_then(|arguments| {
+                    let call = Call { names: names.clone(), arguments };
+                    let result = catch_unwind(AssertUnwindSafe(|| function(call)));
+                    result.unwrap_or_else(|panic| Err(Failure::of_panic(&*panic)))
+                });
                 result.map(|value| value.into().to_datum(USER_PACKAGE)).map_err(|failure| failure.to_host())
             }))
         })
@@ -182,7 +183,7 @@ impl Engine {
     {
         self.define_by(name, lambda_list, documentation, true, |names| {
             HostFunction::Operation(Box::new(move |operation| {
-                let operation = Operation::new(operation, names.clone());
+                let Some(operation) = Operation::new(operation, names.clone()) else { return };
                 // A panic drops the operation, which is how the program hears of it.
                 drop(catch_unwind(AssertUnwindSafe(|| begin(operation))));
             }))

@@ -37,9 +37,15 @@ pub struct Operation {
 }
 
 impl Operation {
-    pub(super) fn new(host: host::HostOperation, names: Arc<[String]>) -> Operation {
-        let arguments = host.arguments().iter().map(Data::from_datum).collect();
-        Operation { host, call: Call { names, arguments } }
+    /// Returns the operation of a call; nothing, after failing it, if its arguments are nested too deeply.
+    pub(super) fn new(host: host::HostOperation, names: Arc<[String]>) -> Option<Operation> {
+        match Failure::of_arguments(host.arguments()) {
+            Ok(arguments) => Some(Operation { host, call: Call { names, arguments } }),
+            Err(failure) => {
+                host.fail(failure.to_host());
+                None
+            }
+        }
     }
 
     /// Returns the call that the operation is for.

@@ -1,5 +1,6 @@
 //! The library in a Rust program.
 
+mod depth;
 mod loops;
 mod operations;
 mod questions;
