@@ -113,14 +113,14 @@ fn no_program_takes_much_more_memory_than_it_may() {
     let faults = run_all(BOMBS, &["--budget", "10000000"], |status| {
         // 1 is a failure for want of stack, 5 one for want of memory, or the end of the budget. A program
         // that takes its time has not been shown to stay within the limit for ever, but for long.
-        (!matches!(status, Some(1 | 5) | None)).then(|| "it did not end by a limit")
+        (!matches!(status, Some(1 | 5) | None)).then_some("it did not end by a limit")
     });
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 #[test]
 fn what_is_given_back_is_used_again() {
-    let faults = run_all(LEAKS, &[], |status| (!matches!(status, Some(0) | None)).then(|| "it failed"));
+    let faults = run_all(LEAKS, &[], |status| (!matches!(status, Some(0) | None)).then_some("it failed"));
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
