@@ -1,4 +1,4 @@
-//! Operating a run from outside: metrics, the monitor, and sessions of operators.
+//! Operating a run from outside: metrics, the monitor, sessions of operators, the system's service manager.
 //!
 //! Servers live on the event loop of `world/`. They read the run through surveys, which have no side effects;
 //! commands go through the machine's inbox. Without an option nothing here runs.
@@ -38,6 +38,8 @@ pub mod noise;
 mod refusal;
 mod scope;
 mod secrets;
+#[cfg(unix)]
+pub mod service;
 mod slime;
 
 use std::fmt;

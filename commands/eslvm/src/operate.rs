@@ -30,6 +30,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use esl_command::{USAGE, complain};
+#[cfg(unix)]
+use esl_operate::service::{ServiceManager, WatchedRun};
 use esl_operate::{ServedPlaces, ServedRun, parse_address};
 use esl_vm::vm::Vm;
 
@@ -94,4 +96,28 @@ impl OperateOptions {
             USAGE
         })
     }
+}
+
+/// Tells the service manager of the system, if the command was started by one that waits for it, that the
+/// program of this name runs. Returns what tells it of the end when it is dropped.
+///
+/// # Errors
+/// The exit status, after a message.
+#[cfg(unix)]
+pub fn tell_manager(machine: &Vm, program: &str) -> Result<Option<WatchedRun>, u8> {
+    let watched = ServiceManager::of_environment()
+        .and_then(|manager| manager.map(|manager| manager.ready(machine, program)).transpose());
+    watched.map_err(|error| {
+        complain(format_args!("the service manager that NOTIFY_SOCKET names cannot be told: {error}"));
+        USAGE
+    })
+}
+
+/// Does nothing: this system has no such manager.
+///
+/// # Errors
+/// Never.
+#[cfg(not(unix))]
+pub fn tell_manager(_machine: &Vm, _program: &str) -> Result<Option<()>, u8> {
+    Ok(None)
 }

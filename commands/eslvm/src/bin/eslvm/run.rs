@@ -11,7 +11,7 @@ use esl_replay::{FileRecorder, RunSetup};
 use esl_timeline::Timeline;
 use esl_vm::vm::Tier;
 use eslvm::mcap::{McapRecording, RunFileOptions};
-use eslvm::operate::OperateOptions;
+use eslvm::operate::{OperateOptions, tell_manager};
 use eslvm::profile::{INTERVAL, Profile, ProfileUnit};
 use eslvm::signal::{SignalTarget, end_on_signal};
 
@@ -131,6 +131,7 @@ pub(crate) fn run(
         })?;
         recorder.begin(&beginning);
     }
+    let managed = tell_manager(&machine, &name)?;
     let started = std::time::Instant::now();
     let is_profiled = profile.is_some() || stats == Some(Stats::Functions);
     let mut found = is_profiled.then(|| Profile::begin(&mut machine));
@@ -147,7 +148,7 @@ pub(crate) fn run(
     let seconds = started.elapsed().as_secs_f64();
     let mut status = summary.ended.exit_status();
     served.end(&machine, summary.ended, status, summary.report.as_deref());
-    drop(served);
+    drop((served, managed));
     if let Some(found) = &mut found {
         found.end(&mut machine);
     }
