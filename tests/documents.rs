@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Folders of documents; `docs` and `examples` with all that is below them.
-const FOLDERS: [&str; 24] = [
+const FOLDERS: [&str; 25] = [
     "",
     "benches",
     "bytecode",
@@ -23,6 +23,7 @@ const FOLDERS: [&str; 24] = [
     "heap",
     "language-server",
     "operate",
+    "packaging",
     "replay",
     "robots",
     "stdlib",

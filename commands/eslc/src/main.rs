@@ -10,6 +10,7 @@ use std::collections::HashSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use esl::module_path::ModulePath;
@@ -23,9 +24,14 @@ use format::{FormatOptions, format_files};
 use import::{ImportOptions, import_tree};
 use warnings::WarningOptions;
 
+/// The answer to `--version`.
+static BUILD: LazyLock<String> = LazyLock::new(|| {
+    command::version_of_build(env!("CARGO_PKG_VERSION"), &[("robots", cfg!(feature = "robots"))])
+});
+
 /// The compiler of ESL, the Execution Support Language.
 #[derive(Parser)]
-#[command(name = "eslc", version, propagate_version = true, max_term_width = 100)]
+#[command(name = "eslc", version, long_version = BUILD.as_str(), propagate_version = true, max_term_width = 100)]
 struct Eslc {
     #[command(subcommand)]
     action: EslcAction,

@@ -19,6 +19,7 @@ mod folder;
 mod shell;
 mod status_line;
 mod usage;
+mod version;
 
 use std::path::Path;
 
@@ -32,6 +33,7 @@ pub use folder::{is_test_file, sources_in};
 pub use shell::{print_completions, write_man_pages};
 pub use status_line::{StatusLine, wants_color};
 pub use usage::{Habits, parse};
+pub use version::version_of_build;
 
 /// Exit status of success.
 pub const SUCCESS: u8 = Ended::SUCCESS;

@@ -39,6 +39,8 @@ mod monitor;
 mod mqtt;
 mod mqtt_messages;
 mod operate;
+#[cfg(target_os = "linux")]
+mod packages;
 #[cfg(unix)]
 mod patches;
 mod paths;
@@ -55,6 +57,8 @@ mod robots;
 mod robots_tools;
 #[cfg(unix)]
 mod secured;
+#[cfg(unix)]
+mod service;
 #[cfg(unix)]
 mod slime;
 mod sockets;

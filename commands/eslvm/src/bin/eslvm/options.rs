@@ -1,6 +1,7 @@
 //! Arguments of the command line.
 
 use std::path::PathBuf;
+use std::sync::LazyLock;
 
 use clap::{Args, Parser, Subcommand};
 use esl::Config;
@@ -13,9 +14,15 @@ use eslvm::profile::ProfileUnit;
 use eslvm::replay::ReplayOptions;
 use eslvm::rights::RightsOptions;
 
+/// The answer to `--version`.
+static BUILD: LazyLock<String> = LazyLock::new(|| {
+    let features = [("native", cfg!(feature = "native")), ("robots", cfg!(feature = "robots"))];
+    esl_command::version_of_build(env!("CARGO_PKG_VERSION"), &features)
+});
+
 /// The virtual machine of ESL, the Execution Support Language.
 #[derive(Parser)]
-#[command(name = "eslvm", version, propagate_version = true, max_term_width = 100)]
+#[command(name = "eslvm", version, long_version = BUILD.as_str(), propagate_version = true, max_term_width = 100)]
 pub(crate) struct Eslvm {
     #[command(subcommand)]
     pub(crate) action: EslvmAction,
