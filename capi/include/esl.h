@@ -126,6 +126,84 @@ typedef enum {
 } esl_state;
 
 /**
+ * Kind of an event of a run.
+ */
+typedef enum {
+  /**
+   * The task was made, or was there when the observer came; the text is its name.
+   */
+  ESL_TASK_BEGINS = 0,
+  /**
+   * Reports call the task by another name from now on.
+   */
+  ESL_TASK_IS_NAMED = 1,
+  /**
+   * The task's turn begins.
+   */
+  ESL_TASK_RUNS = 2,
+  /**
+   * It could run, but another one does.
+   */
+  ESL_TASK_IS_READY = 3,
+  /**
+   * It waits, for what the text says.
+   */
+  ESL_TASK_WAITS = 4,
+  /**
+   * It is suspended by the task that the text names.
+   */
+  ESL_TASK_IS_SUSPENDED = 5,
+  /**
+   * It is to be aborted.
+   */
+  ESL_TASK_IS_TO_END = 6,
+  /**
+   * It has ended, as the text says: succeeded, failed or aborted.
+   */
+  ESL_TASK_ENDS = 7,
+  /**
+   * It has signalled the event of this name.
+   */
+  ESL_TASK_SIGNALS = 8,
+  /**
+   * A signal of the other task, or of none, has ended its wait; the text names the event.
+   */
+  ESL_TASK_IS_WOKEN = 9,
+  /**
+   * It fails, with this cause.
+   */
+  ESL_TASK_FAILS = 10,
+  /**
+   * A recovery procedure begins to deal with a failure of this cause.
+   */
+  ESL_TASK_RECOVERS = 11,
+  /**
+   * The fact of the text was asserted.
+   */
+  ESL_FACT_ASSERTED = 12,
+  /**
+   * The fact of the text was retracted.
+   */
+  ESL_FACT_RETRACTED = 13,
+  /**
+   * The collector begins a cycle. The task is 0, as for all that the collector does.
+   */
+  ESL_COLLECTION_BEGINS = 14,
+  /**
+   * The collector begins a turn, in which no task runs.
+   */
+  ESL_PAUSE_BEGINS = 15,
+  /**
+   * The collector's turn is over.
+   */
+  ESL_PAUSE_ENDS = 16,
+  /**
+   * The collector has ended a cycle.
+   */
+  ESL_COLLECTION_ENDS = 17,
+} esl_event;
+
+/**
  * Kinds of values.
  */
 typedef enum {
@@ -233,6 +311,12 @@ typedef struct esl_handle esl_handle;
 typedef struct esl_operation esl_operation;
 
 /**
+ * Everything that a run has learnt from outside: the answers of its host, the messages of handles, and the
+ * results of functions and operations. It belongs to the caller, who frees it. From any thread.
+ */
+typedef struct esl_recording esl_recording;
+
+/**
  * An answer to come from a run. It belongs to the caller, who frees it, which changes nothing in the run.
  * From any thread, one at a time.
  */
@@ -242,6 +326,17 @@ typedef struct esl_reply esl_reply;
  * A task that was started by a handle.
  */
 typedef struct esl_task esl_task;
+
+/**
+ * A function that takes the output of programs. It is called on the threads of engines, with `length` bytes
+ * that live until it returns; they are UTF-8, but may begin or end within a character.
+ */
+typedef void (*esl_output)(void *user, const char *bytes, size_t length);
+
+/**
+ * A function that frees what `user` points to: once, on any thread, when ESL does not need it any more.
+ */
+typedef void (*esl_destructor)(void *user);
 
 /**
  * Where a run stands after a portion of it.
@@ -306,9 +401,40 @@ typedef esl_failure *(*esl_function)(void *user,
                                      esl_value **result);
 
 /**
- * A function that frees what `user` points to: once, on any thread, when ESL does not need it any more.
+ * An event of a run. The text lives until the observer returns; it is empty where the event has none.
  */
-typedef void (*esl_destructor)(void *user);
+typedef struct {
+  /**
+   * The event.
+   */
+  esl_event event;
+  /**
+   * Nanoseconds since the first observer came.
+   */
+  uint64_t time;
+  /**
+   * Number of the task; 0 if there is none.
+   */
+  uint64_t task;
+  /**
+   * Number of another task that is involved; 0 if there is none.
+   */
+  uint64_t other_task;
+  /**
+   * Whether the task, where it begins, belongs to the library.
+   */
+  bool is_hidden;
+  /**
+   * The text.
+   */
+  const char *text;
+} esl_seen;
+
+/**
+ * A function that is told what happens in a run. It is called on the thread of the engine, at each event: it
+ * returns soon, and uses handles only. It must not leave by an exception of C++ or by `longjmp`.
+ */
+typedef void (*esl_observer)(void *user, const esl_seen *seen);
 
 /**
  * A function that begins an operation, which it hands to a thread or a queue. It is called on the thread of
@@ -380,6 +506,21 @@ esl_status esl_config_set_seed(const esl_config *config, uint64_t seed);
 esl_status esl_config_set_virtual_time(const esl_config *config, bool is_virtual);
 
 /**
+ * Has a function take what programs write, to standard output as well as to standard error, in place of the
+ * streams of the process. `user` is freed when neither the settings nor an engine needs it any more; with a
+ * status other than `ESL_OK` at once.
+ *
+ * The caller sees to it that
+ * `config` is settings; `output` and `destructor` can be called with `user` on the threads of all engines
+ * that are made with the settings; `failure` is a place that can be written, or null.
+ */
+esl_status esl_config_set_output(const esl_config *config,
+                                 esl_output output,
+                                 void *user,
+                                 esl_destructor destructor,
+                                 esl_failure **failure);
+
+/**
  * Grants a right, as the options `--allow-…` of the commands do: "net=127.0.0.1:1883" grants access to that
  * address, "read" to all files. The rights are read, write, net, run, env and serial.
  *
@@ -399,7 +540,8 @@ esl_status esl_engine_new(const esl_config *config, esl_engine **engine, esl_fai
 
 /**
  * Ends what still runs in an engine, as `esl_engine_end`, and frees it. Null is ignored. Returns `ESL_BUSY`,
- * and frees nothing, while the engine is in a call.
+ * and frees nothing, while the engine is in a call. In a child of the process that has made it, ends
+ * nothing.
  *
  * The caller sees to it that
  * `engine` was not freed before.
@@ -764,6 +906,72 @@ esl_status esl_handle_stop(const esl_handle *handle);
 esl_status esl_handle_terminate(const esl_handle *handle);
 
 /**
+ * Reads a value from a text in JSON: objects are association lists whose keys are strings, arrays vectors,
+ * true and false `T` and `NIL`, null `:NULL`, integers of up to 64 bits integers, other numbers floats. An
+ * empty object is `NIL`. From any thread.
+ *
+ * The caller sees to it that
+ * `json` is a text with a null character at its end; `value` and `failure` are places that can be written,
+ * or null.
+ */
+esl_status esl_value_of_json(const char *json, esl_value **value, esl_failure **failure);
+
+/**
+ * Writes a value as a text in JSON, for `esl_text_free`. A list is an object if all its items are pairs
+ * whose keys are strings, symbols or integers, otherwise an array. `NIL` is false, `:NULL` null; other
+ * symbols are strings in lower case. A value without a form in JSON, such as an infinite float or an object
+ * of the embedder's, is refused with `ESL_NOT_OF_TYPE`.
+ *
+ * The caller sees to it that
+ * `value` is a value; `json` and `failure` are places that can be written, or null.
+ */
+esl_status esl_value_json(const esl_value *value, char **json, esl_failure **failure);
+
+/**
+ * Creates a value for an object of the embedder's, such as an open device, which programs hold, hand on and
+ * compare by `eq`. They print it as `#<TYPE LABEL>`. `destructor` is called with the pointer, once and on
+ * any thread, when neither C nor a program has the value any more, or by `esl_object_close`. Returns null,
+ * and calls it, if a text is invalid.
+ *
+ * The caller sees to it that
+ * `type` and `label` are texts with null characters at their ends; `pointer` can be handed to other threads.
+ */
+esl_value *esl_object(const char *type, const char *label, void *pointer, esl_destructor destructor);
+
+/**
+ * Returns the pointer of an object of this type. It is valid until the value is freed, if nothing else
+ * refers to the object, or until it is closed. Returns null for other values, and for an object that was
+ * closed.
+ *
+ * The caller sees to it that
+ * `value` is a value, or null; `type` is a text with a null character at its end, or null.
+ */
+void *esl_value_object(const esl_value *value, const char *type);
+
+/**
+ * Takes an object away from programs, which keep an empty one: calls the destructor now. Returns false for
+ * other values, and for an object that was closed before.
+ *
+ * The caller sees to it that
+ * `value` is a value, or null.
+ */
+bool esl_object_close(const esl_value *value);
+
+/**
+ * Has an observer told what happens in the run, from the next turn on until the end of the engine. With a
+ * status other than `ESL_OK`, `user` is freed at once. From any thread.
+ *
+ * The caller sees to it that
+ * `handle` is a handle; `observer` and `destructor` can be called with `user`; `failure` is a place that can
+ * be written, or null.
+ */
+esl_status esl_handle_subscribe(const esl_handle *handle,
+                                esl_observer observer,
+                                void *user,
+                                esl_destructor destructor,
+                                esl_failure **failure);
+
+/**
  * Defines a function whose calls are operations, as `esl_define` defines functions.
  *
  * The caller sees to it that
@@ -849,6 +1057,51 @@ esl_status esl_operation_on_cancel(const esl_operation *operation,
                                    esl_notice_function function,
                                    void *user,
                                    esl_destructor destructor);
+
+/**
+ * Has engines keep a recording in memory, which `esl_engine_recording` returns.
+ *
+ * The caller sees to it that
+ * `config` is settings, or null.
+ */
+esl_status esl_config_set_recording(const esl_config *config, bool is_recorded);
+
+/**
+ * Has engines replay a recording, which they copy: they call neither functions nor operations of the
+ * embedder, ask no clock, and write nothing, but do the same as the recorded engine if they are given the
+ * same definitions and texts. `esl_engine_canary` tells whether they did.
+ *
+ * The caller sees to it that
+ * `config` is settings and `recording` a recording; `failure` is a place that can be written, or null.
+ */
+esl_status esl_config_set_replay(const esl_config *config,
+                                 const esl_recording *recording,
+                                 esl_failure **failure);
+
+/**
+ * Copies what has been recorded of an engine so far.
+ *
+ * The caller sees to it that
+ * `engine` is an engine; `recording` and `failure` are places that can be written, or null.
+ */
+esl_status esl_engine_recording(const esl_engine *engine, esl_recording **recording, esl_failure **failure);
+
+/**
+ * Frees a recording; null is ignored.
+ *
+ * The caller sees to it that
+ * `recording` was not freed before.
+ */
+void esl_recording_free(esl_recording *recording);
+
+/**
+ * Returns the canary of the run so far: a hash of the turns of its tasks and of the questions to its host.
+ * Runs with the same canary took the same course. Returns 0 if the engine is in a call.
+ *
+ * The caller sees to it that
+ * `engine` is an engine, or null.
+ */
+uint64_t esl_engine_canary(const esl_engine *engine);
 
 /**
  * Takes the answer if it has come; otherwise returns `ESL_PENDING`. An answer can be taken once.

@@ -6,6 +6,7 @@
 #ifndef ESL_HPP
 #define ESL_HPP
 
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <functional>
@@ -64,6 +65,8 @@ public:
     static value vector(const std::vector<value> &items) { return of_items(items, esl_vector); }
     // Reads a value as programs write it.
     static value read(const std::string &text);
+    // Reads a value from a text in JSON: objects are association lists, arrays vectors.
+    static value of_json(const std::string &text);
     // Copies a part of something else.
     static value copy(const esl_value *part) { return part ? value(esl_value_copy(part)) : value(); }
 
@@ -78,6 +81,8 @@ public:
     std::optional<value> find(const std::string &key) const;
     // The value as the program prints it.
     std::string print() const { return take_text(esl_value_print(get())); }
+    // The value as a text in JSON.
+    std::string json() const;
     // The text of a string, or the name of a keyword or symbol.
     std::string text() const { return take_text(esl_value_text(get())); }
 
@@ -163,6 +168,20 @@ inline value value::read(const std::string &text) {
     esl_failure *object = nullptr;
     require(esl_value_read(text.c_str(), &result, &object), object);
     return value(result);
+}
+
+inline value value::of_json(const std::string &text) {
+    esl_value *result = nullptr;
+    esl_failure *object = nullptr;
+    require(esl_value_of_json(text.c_str(), &result, &object), object);
+    return value(result);
+}
+
+inline std::string value::json() const {
+    char *result = nullptr;
+    esl_failure *object = nullptr;
+    require(esl_value_json(get(), &result, &object), object);
+    return take_text(result);
 }
 
 template <typename T>
@@ -301,6 +320,25 @@ private:
     }
 };
 
+// Name of a class whose objects programs hold, by std::shared_ptr:
+//
+//     template <> inline constexpr const char *esl::object_name<motor> = "MOTOR";
+template <typename T>
+inline constexpr const char *object_name = nullptr;
+
+template <typename T>
+struct conversion<std::shared_ptr<T>, std::enable_if_t<(object_name<T> != nullptr)>> {
+    static constexpr const char *name = object_name<T>;
+    static value to(const std::shared_ptr<T> &from) {
+        auto destroy = [](void *pointer) { delete static_cast<std::shared_ptr<T> *>(pointer); };
+        return value(esl_object(name, "", new std::shared_ptr<T>(from), destroy));
+    }
+    static std::optional<std::shared_ptr<T>> from(const esl_value *object) {
+        auto *pointer = static_cast<std::shared_ptr<T> *>(esl_value_object(object, name));
+        return pointer ? std::optional<std::shared_ptr<T>>(*pointer) : std::nullopt;
+    }
+};
+
 // ---- functions of C++
 
 // The types of the parameters of a function object.
@@ -421,6 +459,32 @@ private:
     owner<esl_reply, esl_reply_free> object;
 };
 
+// A task that was started from outside.
+class task {
+public:
+    explicit task(esl_task *owned) : object(owned) {}
+
+    // Has it unwind and run its cleanups.
+    void abort() { esl_task_abort(object.get()); }
+    // The first value of its function, to come.
+    reply result() && { return reply(esl_task_into_reply(object.release())); }
+
+private:
+    owner<esl_task, esl_task_free> object;
+};
+
+// An event of a run, for an observer.
+struct seen {
+    esl_event event;
+    // Since the first observer came.
+    std::chrono::nanoseconds time;
+    // Numbers of tasks; 0 for none.
+    std::uint64_t task, other_task;
+    // Whether the task, where it begins, belongs to the library.
+    bool is_hidden;
+    std::string_view text;
+};
+
 // A way into a run, from all threads.
 class handle {
 public:
@@ -455,6 +519,28 @@ public:
         require(esl_handle_call(object.get(), function.c_str(), pointers.data(), pointers.size(), &result, &thrown),
                 thrown);
         return reply(result);
+    }
+    esl::task spawn(const std::string &function, const std::vector<value> &arguments = {}) {
+        std::vector<const esl_value *> pointers = pointers_to(arguments);
+        esl_task *result = nullptr;
+        esl_failure *thrown = nullptr;
+        require(esl_handle_spawn(object.get(), function.c_str(), pointers.data(), pointers.size(), &result, &thrown),
+                thrown);
+        return esl::task(result);
+    }
+    // Has a function called with each event of the run (esl::seen), on the thread of the engine.
+    template <typename F>
+    void subscribe(F observer) {
+        auto call = [](void *user, const esl_seen *event) {
+            try {
+                (*static_cast<F *>(user))(seen{event->event, std::chrono::nanoseconds(event->time), event->task,
+                                               event->other_task, event->is_hidden, event->text});
+            } catch (...) {
+                // Nothing waits for it, and the run goes on.
+            }
+        };
+        esl_failure *thrown = nullptr;
+        require(esl_handle_subscribe(object.get(), call, new F(std::move(observer)), destroy<F>, &thrown), thrown);
     }
     void pause() { esl_handle_pause(object.get()); }
     void resume() { esl_handle_resume(object.get()); }
@@ -491,6 +577,16 @@ private:
     }
 };
 
+// Everything that a run has learnt from outside, for a replay. Copies are the same recording.
+class recording {
+public:
+    explicit recording(esl_recording *owned) : object(owned, esl_recording_free) {}
+    const esl_recording *get() const { return object.get(); }
+
+private:
+    std::shared_ptr<esl_recording> object;
+};
+
 // Settings of an engine.
 struct settings {
     std::optional<std::size_t> memory = std::nullopt;
@@ -500,6 +596,12 @@ struct settings {
     bool has_virtual_time = false;
     // Rights as in --allow-…: "net=127.0.0.1:1883".
     std::vector<std::string> allow = {};
+    // Takes what programs write, in place of the streams of the process.
+    std::function<void(std::string_view)> output = nullptr;
+    // Keeps a recording, which engine::recording returns.
+    bool is_recorded = false;
+    // Repeats a recording, without the outside.
+    std::optional<recording> replayed = std::nullopt;
 };
 
 // A machine in which programs run. It serves one thread at a time.
@@ -515,6 +617,22 @@ public:
         esl_config_set_virtual_time(config.get(), wanted.has_virtual_time);
         for (const std::string &right : wanted.allow) {
             require(esl_config_allow(config.get(), right.c_str(), &thrown), thrown);
+        }
+        if (wanted.output) {
+            using function = std::function<void(std::string_view)>;
+            auto write = [](void *user, const char *bytes, std::size_t length) {
+                try {
+                    (*static_cast<function *>(user))(std::string_view(bytes, length));
+                } catch (...) {
+                    // The program does not learn what becomes of its output.
+                }
+            };
+            require(esl_config_set_output(config.get(), write, new function(wanted.output), destroy<function>, &thrown),
+                    thrown);
+        }
+        esl_config_set_recording(config.get(), wanted.is_recorded);
+        if (wanted.replayed) {
+            require(esl_config_set_replay(config.get(), wanted.replayed->get(), &thrown), thrown);
         }
         esl_engine *made = nullptr;
         require(esl_engine_new(config.get(), &made, &thrown), thrown);
@@ -582,6 +700,15 @@ public:
         require(esl_poll(object.get(), ticks, &progress, &thrown), thrown);
         return progress;
     }
+    // What was recorded so far.
+    esl::recording recording() const {
+        esl_recording *result = nullptr;
+        esl_failure *thrown = nullptr;
+        require(esl_engine_recording(object.get(), &result, &thrown), thrown);
+        return esl::recording(result);
+    }
+    // Runs with the same canary took the same course.
+    std::uint64_t canary() const { return esl_engine_canary(object.get()); }
     int wakeup_fd() {
         int descriptor = -1;
         esl_failure *thrown = nullptr;

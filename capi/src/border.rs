@@ -7,36 +7,42 @@
 //! Not here: what the objects are.
 
 use std::any::type_name;
-use std::ffi::{CStr, c_char};
+use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
 
 use crate::failure::{Fault, esl_failure};
 use crate::status::esl_status::{self, ESL_INVALID_ARGUMENT, ESL_OK, ESL_PANIC};
 
-/// Addresses of the objects that C holds, in builds with debug assertions.
+/// Addresses and types of the objects that C holds, in builds with debug assertions.
 #[cfg(debug_assertions)]
 mod held {
-    use std::collections::HashSet;
+    use std::collections::HashMap;
     use std::sync::{Mutex, MutexGuard, PoisonError};
 
-    static HELD: Mutex<Option<HashSet<usize>>> = Mutex::new(None);
+    use super::name_of;
 
-    fn held() -> MutexGuard<'static, Option<HashSet<usize>>> {
-        // The set is whole at every moment, so a panic elsewhere does not corrupt it.
+    static HELD: Mutex<Option<HashMap<usize, &'static str>>> = Mutex::new(None);
+
+    fn held() -> MutexGuard<'static, Option<HashMap<usize, &'static str>>> {
+        // The map is whole at every moment, so a panic elsewhere does not corrupt it.
         HELD.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn add(address: usize) {
-        held().get_or_insert_default().insert(address);
+    pub(super) fn add<T>(pointer: *const T) {
+        held().get_or_insert_default().insert(pointer.addr(), name_of::<T>());
     }
 
-    pub(super) fn remove(address: usize) -> bool {
-        held().get_or_insert_default().remove(&address)
+    pub(super) fn remove<T>(pointer: *const T) -> bool {
+        let is_held = has(pointer);
+        if is_held {
+            held().get_or_insert_default().remove(&pointer.addr());
+        }
+        is_held
     }
 
-    pub(super) fn has(address: usize) -> bool {
-        held().get_or_insert_default().contains(&address)
+    pub(super) fn has<T>(pointer: *const T) -> bool {
+        held().get_or_insert_default().get(&pointer.addr()) == Some(&name_of::<T>())
     }
 }
 
@@ -44,7 +50,7 @@ mod held {
 pub(crate) fn give<T>(object: T) -> *mut T {
     let pointer = Box::into_raw(Box::new(object));
     #[cfg(debug_assertions)]
-    held::add(pointer.addr());
+    held::add(pointer);
     pointer
 }
 
@@ -69,7 +75,7 @@ pub(crate) unsafe fn take<T>(pointer: *mut T) -> Result<Box<T>, Fault> {
         return Err(invalid(format!("expected a pointer to `{}`, not a null pointer", name_of::<T>())));
     }
     #[cfg(debug_assertions)]
-    if !held::remove(pointer.addr()) {
+    if !held::remove(pointer) {
         return Err(invalid(format!("expected a live `{}`: this one was freed before", name_of::<T>())));
     }
     // SAFETY: the caller promises that the pointer is null or valid; `give` has made the pointer from a box.
@@ -85,7 +91,7 @@ pub(crate) unsafe fn take<T>(pointer: *mut T) -> Result<Box<T>, Fault> {
 /// The pointer is null, or comes from [`give`], and the object is not taken while the reference lives.
 pub(crate) unsafe fn look<'a, T>(pointer: *const T) -> Result<&'a T, Fault> {
     #[cfg(debug_assertions)]
-    if !pointer.is_null() && !held::has(pointer.addr()) {
+    if !pointer.is_null() && !held::has(pointer) {
         return Err(invalid(format!("expected a live `{}`: this one was freed before", name_of::<T>())));
     }
     // SAFETY: the caller promises that the pointer is null or valid.
@@ -135,6 +141,30 @@ pub(crate) unsafe fn elements<'a, T>(pointer: *const T, length: usize, what: &st
         (true, _) => Err(invalid(format!("expected the {what}, not a null pointer"))),
         // SAFETY: the caller promises that the pointer is null or valid.
         (false, _) => Ok(unsafe { std::slice::from_raw_parts(pointer, length) }),
+    }
+}
+
+/// Hands a text to C, until [`free_text`].
+pub(crate) fn give_text(text: CString) -> *mut c_char {
+    let pointer = text.into_raw();
+    #[cfg(debug_assertions)]
+    held::add(pointer);
+    pointer
+}
+
+/// Frees a text that C holds. Null is ignored; so is, in builds with debug assertions, one that C does not
+/// hold.
+///
+/// # Safety
+/// The pointer is null, or comes from [`give_text`] and was not freed since.
+pub(crate) unsafe fn free_text(pointer: *mut c_char) {
+    #[cfg(debug_assertions)]
+    if !held::remove(pointer) {
+        return;
+    }
+    if !pointer.is_null() {
+        // SAFETY: the caller promises that the pointer is null or valid; `give_text` has made it.
+        drop(unsafe { CString::from_raw(pointer) });
     }
 }
 

@@ -1,19 +1,21 @@
 //! Settings of an engine that is to be made.
 
 use std::cell::RefCell;
-use std::ffi::c_char;
+use std::ffi::{c_char, c_void};
 use std::ptr;
+use std::sync::Arc;
 
 use esl::Config;
-use esl::host::{RealHost, Right, Rights};
+use esl::host::{Host, NotedRecord, RealHost, Recording, RecordingHost, ReplayHost, Right, Rights};
 
 use crate::border::{freeing, guarded, look, making, take, text};
 use crate::failure::{Fault, esl_failure};
+use crate::function::{UserData, esl_destructor, no_callback};
 use crate::status::esl_status::{self, ESL_INVALID_ARGUMENT};
 
 /// Settings for engines: limits, rights, clock. A new one has the defaults: a gigabyte of memory, no rights,
 /// real time. One thread at a time.
-pub struct esl_config(RefCell<Settings>);
+pub struct esl_config(pub(crate) RefCell<Settings>);
 
 #[derive(Clone, Default)]
 pub(crate) struct Settings {
@@ -21,6 +23,28 @@ pub(crate) struct Settings {
     pub(crate) ticks: Option<u64>,
     rights: Rights,
     has_virtual_time: bool,
+    pub(crate) is_recorded: bool,
+    pub(crate) replayed: Option<Arc<[NotedRecord]>>,
+    output: Option<Arc<OutputOfC>>,
+}
+
+/// A function that takes the output of programs. It is called on the threads of engines, with `length` bytes
+/// that live until it returns; they are UTF-8, but may begin or end within a character.
+pub type esl_output = Option<unsafe extern "C" fn(user: *mut c_void, bytes: *const c_char, length: usize)>;
+
+struct OutputOfC {
+    function: unsafe extern "C" fn(user: *mut c_void, bytes: *const c_char, length: usize),
+    user: UserData,
+}
+
+// SAFETY: `esl_config_set_output` asks for a function that takes the pointer on the threads of all engines.
+unsafe impl Sync for OutputOfC {}
+
+impl OutputOfC {
+    fn write(&self, bytes: &[u8]) {
+        // SAFETY: the embedder has given the function for this pointer; the bytes live until it returns.
+        unsafe { (self.function)(self.user.pointer, bytes.as_ptr().cast(), bytes.len()) };
+    }
 }
 
 impl Settings {
@@ -36,9 +60,30 @@ impl Settings {
         Ok(unsafe { look(config) }?.0.borrow().clone())
     }
 
-    pub(crate) fn host(&self) -> RealHost {
-        let host = RealHost::new(Vec::new()).with_rights(self.rights.clone());
-        if self.has_virtual_time { host.with_virtual_time() } else { host }
+    /// Returns the host of an engine, and its recording, if there is one.
+    pub(crate) fn host(&self) -> (Box<dyn Host + Send>, Option<Recording>) {
+        let output = self.output.clone();
+        if let Some(records) = &self.replayed {
+            let host = ReplayHost::new(records.clone());
+            let Some(output) = output else { return (Box::new(host), None) };
+            return (Box::new(host.with_screen(move |_, bytes| output.write(bytes))), None);
+        }
+        let mut host = RealHost::new(Vec::new()).with_rights(self.rights.clone());
+        if self.has_virtual_time {
+            host = host.with_virtual_time();
+        }
+        if let Some(output) = output {
+            host = host.with_screen(Box::new(move |bytes| {
+                output.write(bytes);
+                Ok(())
+            }));
+        }
+        if !self.is_recorded {
+            return (Box::new(host), None);
+        }
+        let host = RecordingHost::new(host);
+        let recording = host.recording();
+        (Box::new(host), Some(recording))
     }
 }
 
@@ -62,7 +107,7 @@ pub unsafe extern "C" fn esl_config_free(config: *mut esl_config) {
 ///
 /// # Safety
 /// `config` is settings, or null.
-unsafe fn change(config: *const esl_config, change: impl FnOnce(&mut Settings)) -> esl_status {
+pub(crate) unsafe fn change(config: *const esl_config, change: impl FnOnce(&mut Settings)) -> esl_status {
     // SAFETY: each pointer is null, or to what C holds and lends.
     unsafe {
         guarded(ptr::null_mut(), || {
@@ -123,6 +168,32 @@ pub unsafe extern "C" fn esl_config_set_virtual_time(
 ) -> esl_status {
     // SAFETY: each pointer is null, or to what C holds and lends.
     unsafe { change(config, |settings| settings.has_virtual_time = is_virtual) }
+}
+
+/// Has a function take what programs write, to standard output as well as to standard error, in place of the
+/// streams of the process. `user` is freed when neither the settings nor an engine needs it any more; with a
+/// status other than `ESL_OK` at once.
+///
+/// # Safety
+/// `config` is settings; `output` and `destructor` can be called with `user` on the threads of all engines
+/// that are made with the settings; `failure` is a place that can be written, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_config_set_output(
+    config: *const esl_config,
+    output: esl_output,
+    user: *mut c_void,
+    destructor: esl_destructor,
+    failure: *mut *mut esl_failure,
+) -> esl_status {
+    let user = UserData::new(user, destructor);
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe {
+        guarded(failure, || {
+            let function = output.ok_or_else(no_callback)?;
+            look(config)?.0.borrow_mut().output = Some(Arc::new(OutputOfC { function, user }));
+            Ok(())
+        })
+    }
 }
 
 /// Grants a right, as the options `--allow-…` of the commands do: "net=127.0.0.1:1883" grants access to that

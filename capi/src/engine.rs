@@ -5,11 +5,13 @@ use std::sync::{Mutex, MutexGuard, OnceLock, TryLockError};
 use std::time::Instant;
 
 use esl::engine::{Ending, Poll};
+use esl::host::Recording;
 use esl::{Data, Engine, Error};
 
 use crate::border::{guarded, hand, look, store, take, text};
 use crate::config::{Settings, esl_config};
 use crate::failure::{Fault, esl_failure};
+use crate::fork::Process;
 use crate::reply::{AwaitedAnswer, esl_reply};
 use crate::status::esl_status::{self, ESL_BUSY, ESL_PANIC};
 use crate::value::{esl_value, values};
@@ -19,6 +21,8 @@ use crate::wakeup::Wakeup;
 /// returns `ESL_BUSY`. Other threads reach the run by handles.
 pub struct esl_engine {
     engine: Mutex<Engine>,
+    pub(crate) recording: Option<Recording>,
+    process: Process,
     wakeup: OnceLock<Wakeup>,
 }
 
@@ -65,7 +69,9 @@ impl esl_engine {
     /// The pointer is null, or to an engine that is not freed meanwhile.
     pub(crate) unsafe fn lock<'a>(engine: *const esl_engine) -> Result<MutexGuard<'a, Engine>, Fault> {
         // SAFETY: each pointer is null, or to what C holds and lends.
-        match unsafe { look(engine) }?.engine.try_lock() {
+        let engine = unsafe { look(engine) }?;
+        engine.process.check()?;
+        match engine.engine.try_lock() {
             Ok(engine) => Ok(engine),
             Err(TryLockError::Poisoned(_)) => Err(Fault::new(
                 ESL_PANIC,
@@ -105,18 +111,24 @@ pub unsafe extern "C" fn esl_engine_new(
     unsafe {
         guarded(failure, || {
             let settings = Settings::of(config)?;
-            let mut made = Engine::with(settings.machine.clone(), Box::new(settings.host()))?;
+            let process = Process::this();
+            let (host, recording) = settings.host();
+            let mut made = Engine::with(settings.machine.clone(), host)?;
             if let Some(ticks) = settings.ticks {
                 made = made.with_ticks(ticks);
             }
-            hand(engine, esl_engine { engine: Mutex::new(made), wakeup: OnceLock::new() });
+            hand(
+                engine,
+                esl_engine { engine: Mutex::new(made), recording, process, wakeup: OnceLock::new() },
+            );
             Ok(())
         })
     }
 }
 
 /// Ends what still runs in an engine, as `esl_engine_end`, and frees it. Null is ignored. Returns `ESL_BUSY`,
-/// and frees nothing, while the engine is in a call.
+/// and frees nothing, while the engine is in a call. In a child of the process that has made it, ends
+/// nothing.
 ///
 /// # Safety
 /// `engine` was not freed before.
@@ -128,6 +140,11 @@ pub unsafe extern "C" fn esl_engine_free(engine: *mut esl_engine) -> esl_status 
     // SAFETY: each pointer is null, or to what C holds and lends.
     unsafe {
         guarded(std::ptr::null_mut(), || {
+            if !look(engine)?.process.is_this() {
+                // Its tasks are those of the parent: to end them here would wait for threads of the parent.
+                std::mem::forget(take(engine)?);
+                return Ok(());
+            }
             // The lock is a part of the engine: it is let go before.
             match esl_engine::lock(engine).map(drop) {
                 Err(fault) if fault.status() != ESL_PANIC => Err(fault),

@@ -16,7 +16,7 @@ use crate::value::{esl_value, values};
 
 /// A way into a run, from all threads at the same time. While a program has a handle, it waits for what may
 /// come by it instead of being deadlocked.
-pub struct esl_handle(Handle);
+pub struct esl_handle(pub(crate) Handle);
 
 /// A task that was started by a handle.
 pub struct esl_task(TaskHandle);

@@ -4,11 +4,12 @@
 //! | --- | --- |
 //! | `border` | pointers from C, objects for C, panics |
 //! | `status`, `failure` | the outcome of a call, and its reason |
-//! | `value` | values of programs |
+//! | `value`, `json`, `object` | values of programs; their texts in JSON; objects of C among them |
 //! | `config`, `engine` | engines: limits, rights, evaluation, the loop |
 //! | `function`, `operation` | functions and operations that C implements |
 //! | `handle`, `reply` | other threads, and answers to come |
-//! | `wakeup` | the file descriptor that a loop waits for |
+//! | `observer`, `recording` | watching a run; recording and replaying it |
+//! | `wakeup`, `fork` | the file descriptor that a loop waits for; children of the process |
 //!
 //! Guarantees: no panic leaves a function. Every pointer may be null. Nothing here is known to a program that
 //! embeds the language in Rust: everything goes through the crate `esl`.
@@ -24,9 +25,14 @@ mod border;
 pub mod config;
 pub mod engine;
 pub mod failure;
+mod fork;
 pub mod function;
 pub mod handle;
+pub mod json;
+pub mod object;
+pub mod observer;
 pub mod operation;
+pub mod recording;
 pub mod reply;
 pub mod status;
 pub mod value;

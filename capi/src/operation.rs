@@ -114,8 +114,10 @@ pub unsafe extern "C" fn esl_operation_fail(
     // SAFETY: each pointer is null, or to what C holds and lends.
     unsafe {
         guarded(ptr::null_mut(), || {
-            let failure = take(failure)?;
-            take(operation)?.0.fail(failure.to_engine());
+            let failure = take(failure);
+            let operation = take(operation)?.0;
+            // Without a failure it is dropped, which the call learns.
+            operation.fail(failure?.to_engine());
             Ok(())
         })
     }

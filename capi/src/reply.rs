@@ -1,4 +1,4 @@
-//! AwaitedAnswers to come.
+//! Answers to come.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -7,12 +7,13 @@ use esl::engine::{QueryAnswer, Reply};
 
 use crate::border::{freeing, guarded, hand, look, take};
 use crate::failure::{Fault, esl_failure};
+use crate::fork::Process;
 use crate::status::esl_status::{self, ESL_PENDING};
 use crate::value::esl_value;
 
 /// An answer to come from a run. It belongs to the caller, who frees it, which changes nothing in the run.
 /// From any thread, one at a time.
-pub struct esl_reply(Mutex<AwaitedAnswer>);
+pub struct esl_reply(Mutex<AwaitedAnswer>, Process);
 
 impl esl_reply {
     fn answer(&self) -> MutexGuard<'_, AwaitedAnswer> {
@@ -40,7 +41,7 @@ fn data_of(answers: Vec<QueryAnswer>) -> Data {
 
 impl AwaitedAnswer {
     pub(crate) fn into_reply(self) -> esl_reply {
-        esl_reply(Mutex::new(self))
+        esl_reply(Mutex::new(self), Process::this())
     }
 
     fn take(&self) -> Option<Result<Data, esl::Error>> {
@@ -106,6 +107,7 @@ pub unsafe extern "C" fn esl_reply_wait(
     // SAFETY: each pointer is null, or to what C holds and lends.
     unsafe {
         guarded(failure, || {
+            look(reply)?.1.check()?;
             let mut answer = look(reply)?.answer();
             let data = std::mem::replace(&mut *answer, AwaitedAnswer::Taken).wait().map_err(Fault::from)?;
             hand(value, esl_value(data));

@@ -1,12 +1,14 @@
 //! Values, as C makes and reads them.
 
-use std::ffi::{CString, c_char};
+use std::ffi::c_char;
 use std::ptr;
 
 use esl::Data;
 use esl::data::PackedVector;
 
-use crate::border::{elements, freeing, guarded, hand, look_within, making, store, take, text};
+use crate::border::{
+    elements, free_text, freeing, give_text, guarded, hand, look_within, making, store, take, text,
+};
 use crate::failure::{Fault, c_text, esl_failure};
 use crate::status::esl_status::{self, ESL_NOT_OF_TYPE};
 
@@ -430,11 +432,6 @@ pub unsafe extern "C" fn esl_value_item(value: *const esl_value, index: usize) -
     item.map_or(ptr::null(), |data| ptr::from_ref(data).cast())
 }
 
-/// Returns a text of the value that the caller frees with `esl_text_free`.
-fn owned(text: CString) -> *mut c_char {
-    text.into_raw()
-}
-
 /// Copies the text of a string or a character, or the name of a keyword or symbol, for `esl_text_free`. Null
 /// characters in it become U+FFFD. Returns null for other values.
 ///
@@ -444,8 +441,8 @@ fn owned(text: CString) -> *mut c_char {
 pub unsafe extern "C" fn esl_value_text(value: *const esl_value) -> *mut c_char {
     // SAFETY: each pointer is null, or to what C holds and lends.
     match unsafe { value.as_ref() }.map(|value| &value.0) {
-        Some(Data::String(text) | Data::Keyword(text) | Data::Symbol(text)) => owned(c_text(text)),
-        Some(Data::Character(character)) => owned(c_text(character.to_string())),
+        Some(Data::String(text) | Data::Keyword(text) | Data::Symbol(text)) => give_text(c_text(text)),
+        Some(Data::Character(character)) => give_text(c_text(character.to_string())),
         _ => ptr::null_mut(),
     }
 }
@@ -457,7 +454,7 @@ pub unsafe extern "C" fn esl_value_text(value: *const esl_value) -> *mut c_char 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn esl_value_print(value: *const esl_value) -> *mut c_char {
     // SAFETY: each pointer is null, or to what C holds and lends.
-    unsafe { value.as_ref() }.map_or(ptr::null_mut(), |value| owned(c_text(value.0.to_string())))
+    unsafe { value.as_ref() }.map_or(ptr::null_mut(), |value| give_text(c_text(value.0.to_string())))
 }
 
 /// Frees a text that belongs to the caller; null is ignored.
@@ -466,8 +463,6 @@ pub unsafe extern "C" fn esl_value_print(value: *const esl_value) -> *mut c_char
 /// `text` comes from a function that says so, and was not freed before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn esl_text_free(text: *mut c_char) {
-    if !text.is_null() {
-        // SAFETY: each pointer is null, or to what C holds and lends; `owned` has made the text.
-        drop(unsafe { CString::from_raw(text) });
-    }
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe { free_text(text) };
 }

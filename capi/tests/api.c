@@ -7,6 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 static int faults = 0;
 
@@ -177,6 +179,132 @@ static void limits_and_rights(void) {
     esl_engine_free(engine);
 }
 
+static int gives_json(const char *text, const char *expected) {
+    esl_value *value = NULL;
+    char *json = NULL;
+    CHECK(esl_value_read(text, &value, NULL) == ESL_OK);
+    esl_status status = esl_value_json(value, &json, NULL);
+    int is_equal = expected ? json != NULL && strcmp(json, expected) == 0 : status == ESL_NOT_OF_TYPE && !json;
+    if (!is_equal) printf("%s gives %s\n", text, json ? json : "nothing");
+    esl_text_free(json);
+    esl_value_free(value);
+    return is_equal;
+}
+
+static void json(void) {
+    CHECK(gives_json("((\"a\" . 1) (b 2 c) (7))", "{\"a\":1,\"b\":[2,\"c\"],\"7\":false}"));
+    CHECK(gives_json("(1 :null :false t nil :on)", "[1,null,false,true,false,\"on\"]"));
+    CHECK(gives_json("#(1/2 -0.5d0 1d300 123456789012345678901234567890)",
+                     "[0.5,-0.5,1e300,123456789012345678901234567890]"));
+    CHECK(gives_json("(\"a\\\"b\" #\\x)", "[\"a\\\"b\",\"x\"]"));
+    CHECK(gives_json("(1 . 2)", NULL));
+    esl_value *value = esl_float(INFINITY);
+    esl_failure *failure = NULL;
+    CHECK(esl_value_json(value, NULL, &failure) == ESL_NOT_OF_TYPE);
+    CHECK(strstr(esl_failure_message(failure), "JSON") != NULL);
+    esl_failure_free(failure);
+    esl_value_free(value);
+    /* The module of the library agrees. */
+    esl_engine *engine = new_engine(NULL);
+    CHECK(esl_eval(engine, "(require :json)", NULL, NULL) == ESL_OK);
+    const char *texts[] = {"{\"b\": 1, \"a\": [true, false, null, 1.5, -3]}", "[]", "[[], {\"\": \"\\u00e4\"}]",
+                           "18446744073709551615", "\"x\""};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        char *program = malloc(1000), *printed, *written, *expected;
+        esl_value *text = esl_string(texts[i]), *parsed = NULL;
+        char *quoted = esl_value_print(text);
+        CHECK(esl_value_of_json(texts[i], &value, NULL) == ESL_OK);
+        printed = esl_value_print(value);
+        snprintf(program, 1000, "(json:parse %s :objects :alist)", quoted);
+        CHECK(gives(engine, program, printed));
+        snprintf(program, 1000, "(json:stringify (json:parse %s :objects :alist) :objects :alist)", quoted);
+        CHECK(esl_eval(engine, program, &parsed, NULL) == ESL_OK);
+        expected = esl_value_text(parsed);
+        CHECK(esl_value_json(value, &written, NULL) == ESL_OK);
+        CHECK(strcmp(written, expected) == 0);
+        esl_text_free(written), esl_text_free(expected), esl_text_free(printed), esl_text_free(quoted);
+        esl_value_free(value), esl_value_free(text), esl_value_free(parsed);
+        free(program);
+    }
+    CHECK(esl_value_of_json("{\"a\": }", &value, &failure) == ESL_NOT_OF_TYPE);
+    CHECK(strstr(esl_failure_message(failure), "line 1 column 7") != NULL);
+    esl_failure_free(failure);
+    esl_engine_free(engine);
+}
+
+/* Objects of C: a program holds them, until it has lost them. */
+static void objects(void) {
+    int device = 0, other = 0;
+    esl_engine *engine = new_engine(NULL);
+    esl_value *value = esl_object("CAMERA", "at 7", &device, note_end);
+    const esl_value *arguments[] = {value};
+    esl_value *same = NULL;
+    CHECK(esl_value_kind(value) == ESL_HOST_OBJECT);
+    CHECK(esl_call(engine, "identity", arguments, 1, &same, NULL) == ESL_OK);
+    esl_value_free(value);
+    CHECK(esl_value_object(same, "CAMERA") == &device && esl_value_object(same, "MOTOR") == NULL);
+    char *text = esl_value_print(same);
+    CHECK(strcmp(text, "#<CAMERA at 7>") == 0);
+    esl_text_free(text);
+    CHECK(device == 0 && esl_object_close(same) && device == -1 && !esl_object_close(same));
+    CHECK(esl_value_object(same, "CAMERA") == NULL);
+    esl_value_free(same);
+    CHECK(esl_object("CAMERA", NULL, &other, note_end) == NULL && other == -1);
+    esl_engine_free(engine);
+}
+
+struct seen_events {
+    int facts, failures, ends;
+    char output[100];
+};
+
+static void observe(void *user, const esl_seen *seen) {
+    struct seen_events *events = user;
+    if (seen->event == ESL_FACT_ASSERTED) events->facts += strstr(seen->text, "RIDGE") != NULL;
+    if (seen->event == ESL_TASK_FAILS) events->failures += strcmp(seen->text, "LOST") == 0 || strcmp(seen->text, ":LOST") == 0;
+    if (seen->event == ESL_TASK_ENDS) events->ends++;
+}
+
+static void print(void *user, const char *bytes, size_t length) {
+    struct seen_events *events = user;
+    strncat(events->output, bytes, length);
+}
+
+/* A run that is watched, recorded, and replayed without its outside. */
+static void watching(void) {
+    struct seen_events events = {0}, repeated = {0};
+    int user = 0;
+    esl_config *config = esl_config_new();
+    CHECK(esl_config_set_output(config, print, &events, NULL, NULL) == ESL_OK);
+    CHECK(esl_config_set_recording(config, true) == ESL_OK);
+    esl_engine *engine = new_engine(config);
+    esl_handle *handle = NULL;
+    CHECK(esl_engine_handle(engine, &handle, NULL) == ESL_OK);
+    CHECK(esl_handle_subscribe(handle, observe, &events, NULL, NULL) == ESL_OK);
+    CHECK(esl_handle_subscribe(handle, NULL, NULL, NULL, NULL) == ESL_INVALID_ARGUMENT);
+    CHECK(esl_define(engine, "add", "(a b)", "The sum.", add, &user, NULL, NULL) == ESL_OK);
+    const char *text = "(progn (assert '(at rover ridge)) (handler-case (fail :lost) (failure () nil)) (princ (add 40 2))"
+                       "       (list (random 1000) (get-universal-time)))";
+    char *first = eval(engine, text);
+    CHECK(events.facts == 1 && events.failures == 1 && strcmp(events.output, "42") == 0);
+    esl_recording *recording = NULL;
+    CHECK(esl_engine_recording(engine, &recording, NULL) == ESL_OK);
+    CHECK(esl_config_set_replay(config, recording, NULL) == ESL_OK);
+    CHECK(esl_config_set_output(config, print, &repeated, NULL, NULL) == ESL_OK);
+    esl_recording_free(recording);
+    esl_engine *replay = new_engine(config);
+    CHECK(esl_engine_recording(replay, &recording, NULL) == ESL_INVALID_ARGUMENT);
+    user = 0;
+    CHECK(esl_define(replay, "add", "(a b)", "The sum.", add, &user, NULL, NULL) == ESL_OK);
+    CHECK(gives(replay, text, first) && user == 0 && strcmp(repeated.output, "42") == 0);
+    CHECK(esl_engine_canary(replay) == esl_engine_canary(engine) && esl_engine_canary(NULL) == 0);
+    esl_text_free(first);
+    esl_handle_free(handle);
+    esl_engine_free(engine);
+    esl_engine_free(replay);
+    esl_config_free(config);
+}
+
 static atomic_int is_over;
 
 /* Another thread: signals, facts, a call. */
@@ -278,6 +406,69 @@ static void bad_use(void) {
     esl_value_free(value);
 }
 
+static void *call_meanwhile(void *engine) {
+    esl_failure *failure = NULL;
+    esl_status status = esl_eval(engine, "1", NULL, &failure);
+    CHECK(status == ESL_BUSY && strstr(esl_failure_message(failure), "one thread at a time") != NULL);
+    esl_failure_free(failure);
+    return NULL;
+}
+
+static esl_failure *let_another_call(void *user, const esl_value *const *arguments, size_t count, esl_value **result) {
+    (void)arguments, (void)count, (void)result;
+    pthread_t thread;
+    CHECK(pthread_create(&thread, NULL, call_meanwhile, user) == 0);
+    pthread_join(thread, NULL);
+    return NULL;
+}
+
+static esl_failure *leave(void *user, const esl_value *const *arguments, size_t count, esl_value **result) {
+    (void)user, (void)arguments, (void)count, (void)result;
+    exit(7);
+}
+
+/* Returns the exit status of a child that does something with an engine of this process, or makes one. */
+static int in_a_child(esl_engine *engine, esl_reply *reply, int makes_one) {
+    fflush(stdout);
+    pid_t child = fork();
+    if (child == 0) {
+        alarm(60);
+        if (makes_one) {
+            esl_engine *made = new_engine(NULL);
+            CHECK(esl_define(made, "leave", "()", "", leave, NULL, NULL, NULL) == ESL_OK);
+            CHECK(gives(made, "(+ 1 2)", "3"));
+            eval(made, "(unwind-protect (leave) (princ 'no))");
+            _exit(1);
+        }
+        esl_failure *failure = NULL;
+        CHECK(esl_eval(engine, "1", NULL, &failure) == ESL_ENDED);
+        CHECK(strstr(esl_failure_message(failure), "after the fork") != NULL);
+        esl_failure_free(failure);
+        CHECK(esl_reply_wait(reply, NULL, NULL) == ESL_ENDED);
+        esl_reply_free(reply);
+        CHECK(esl_engine_free(engine) == ESL_OK);
+        fflush(stdout);
+        _exit(faults != 0);
+    }
+    int status = -1;
+    CHECK(child > 0 && waitpid(child, &status, 0) == child);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/* Calls from a second thread during a call, after a fork, and an end of the process within a call. */
+static void processes(void) {
+    esl_engine *engine = new_engine(NULL);
+    esl_reply *reply = NULL;
+    CHECK(esl_define(engine, "meanwhile", "()", "", let_another_call, engine, NULL, NULL) == ESL_OK);
+    CHECK(gives(engine, "(progn (meanwhile) 5)", "5"));
+    CHECK(esl_begin(engine, "(list 1)", &reply, NULL) == ESL_OK);
+    CHECK(in_a_child(engine, reply, 0) == 0);
+    CHECK(in_a_child(NULL, NULL, 1) == 7);
+    CHECK(gives(engine, "(+ 1 2)", "3"));
+    esl_reply_free(reply);
+    esl_engine_free(engine);
+}
+
 /* Many engines, made and dropped. */
 static void engines(void) {
     for (int i = 0; i < 20; i++) {
@@ -293,8 +484,12 @@ int main(void) {
     functions();
     failures();
     limits_and_rights();
+    json();
+    objects();
+    watching();
     threads();
     bad_use();
+    processes();
     engines();
     printf("%d faults\n", faults);
     return faults != 0;

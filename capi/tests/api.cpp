@@ -39,6 +39,67 @@ static void values() {
     CHECK(cause_of([] { esl::value(1.5).as<int>(); }) == ":TYPE-ERROR");
 }
 
+struct motor {
+    double power = 0;
+};
+template <>
+inline constexpr const char *esl::object_name<motor> = "MOTOR";
+
+static void objects() {
+    std::weak_ptr<motor> alive;
+    {
+        esl::engine engine;
+        engine.define("motor", "()", "A motor.", [&] {
+            auto made = std::make_shared<motor>();
+            alive = made;
+            return made;
+        });
+        engine.define("set-power", "(motor power)", "The power.", [](std::shared_ptr<motor> motor, double power) {
+            return motor->power = power;
+        });
+        CHECK(engine.eval("(let ((m (motor))) (list (set-power m 2) m (eq m m)))").print() == "(2.0 #<MOTOR> T)");
+        CHECK(cause_of([&] { engine.eval("(set-power 1 2)"); }) == ":TYPE-ERROR");
+        CHECK(engine.eval("(defparameter *m* (motor))").text() == "*M*" && !alive.expired());
+        CHECK(engine.eval("*m*").as<std::shared_ptr<motor>>()->power == 0);
+    }
+    CHECK(alive.expired());
+}
+
+static void json() {
+    esl::value read = esl::value::of_json("{\"a\": [1, 2.5, null], \"b\": {\"c\": true}}");
+    CHECK(read.print() == "((\"a\" . #(1 2.5 :NULL)) (\"b\" (\"c\" . T)))");
+    CHECK(read.json() == "{\"a\":[1,2.5,null],\"b\":{\"c\":true}}");
+    CHECK(cause_of([] { esl::value::of_json("[1"); }) == ":NOT-OF-TYPE");
+}
+
+static void watching() {
+    std::string printed, told;
+    esl::settings settings;
+    settings.output = [&](std::string_view text) { printed += text; };
+    settings.is_recorded = true;
+    settings.seed = 5;
+    esl::engine engine(settings);
+    engine.handle().subscribe([&](const esl::seen &event) {
+        if (event.event == ESL_FACT_ASSERTED) told += event.text;
+    });
+    engine.define("roll", "()", "A number.", [] { return 4; });
+    const char *text = "(progn (assert '(at rover ridge)) (princ (list (roll) (random 1000))) (get-universal-time))";
+    esl::value time = engine.eval(text);
+    CHECK(told.find("ROVER RIDGE") != std::string::npos && printed.substr(0, 3) == "(4 ");
+    settings.replayed = engine.recording();
+    std::string repeated;
+    settings.output = [&](std::string_view text) { repeated += text; };
+    esl::engine replay(settings);
+    replay.handle().subscribe([](const esl::seen &) {});
+    replay.define("roll", "()", "A number.", []() -> int { throw std::runtime_error("it is not called"); });
+    CHECK(replay.eval(text).print() == time.print() && repeated == printed);
+    CHECK(replay.canary() == engine.canary());
+    esl::task patrol = engine.handle().spawn("sleep", {3600});
+    patrol.abort();
+    engine.run();
+    CHECK(cause_of([&] { std::move(patrol).result().wait(); }) == ":ABORTED");
+}
+
 static void functions() {
     esl::engine engine;
     engine.define("area", "(width &optional height)", "An area.",
@@ -96,6 +157,9 @@ static void threads() {
 int main() {
     values();
     functions();
+    objects();
+    json();
+    watching();
     operations();
     threads();
     CHECK(cause_of([] { esl::settings s; s.allow = {"fly"}; esl::engine engine(s); }) == ":INVALID-ARGUMENT");

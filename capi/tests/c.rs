@@ -19,6 +19,11 @@ fn library_folder() -> PathBuf {
 
 /// Compiles a program, and runs it by a command in front of it.
 fn run(source: &str, compiler: &[&str], before: &[&str]) -> Option<Output> {
+    run_with(source, compiler, before, &[])
+}
+
+/// Compiles a program, and runs it with arguments by a command in front of it.
+fn run_with(source: &str, compiler: &[&str], before: &[&str], arguments: &[&str]) -> Option<Output> {
     let folder = library_folder();
     let name = format!("capi-{}-{}", source.replace(['/', '.'], "-"), compiler.len() + before.len());
     let program = folder.join(name);
@@ -44,7 +49,7 @@ fn run(source: &str, compiler: &[&str], before: &[&str]) -> Option<Output> {
         }
         None => Command::new(&program),
     };
-    command.output().ok()
+    command.args(arguments).output().ok()
 }
 
 /// Flags of C, and that builds with debug assertions refuse what was freed before.
@@ -111,9 +116,76 @@ fn the_programs_of_the_manual_run() {
     }
 }
 
+/// Number of the tasks that the chapter on embedding has in several languages.
+const TASKS: usize = 9;
+
+#[test]
+fn the_tasks_of_the_chapter_on_embedding_run() {
+    let chapter =
+        std::fs::read_to_string(root().join("../docs/manual/embedding.md")).expect("it can be read");
+    let (_, tasks) = chapter.split_once("\n## Tasks in four languages\n").expect("it has the section");
+    let tasks: Vec<&str> = tasks.split("\n### ").skip(1).collect();
+    let block = |task: &str, kind: &str| {
+        let block = task.split(&format!("```{kind}\n")).nth(1).and_then(|rest| rest.split("```").next());
+        block.unwrap_or_else(|| panic!("the task has no block {kind}: {task}")).to_owned()
+    };
+    let c = [&C[..], &["-Wno-unused-parameter", "-Wno-unused-result"]].concat();
+    let of_c = [
+        "#include \"esl.h\"\n#include <pthread.h>\n#include <stdatomic.h>\n#include <stdio.h>\n\
+         #include <stdlib.h>\n#include <unistd.h>\n",
+        "esl_engine *engine = NULL; esl_engine_new(NULL, &engine, NULL); example(engine); esl_engine_free(engine);",
+        "setvbuf(stdout, NULL, _IONBF, 0);",
+        "puts(\"\\n@\");",
+    ];
+    let of_cpp = [
+        "#include \"esl.hpp\"\n#include <algorithm>\n#include <future>\n#include <iostream>\n#include <thread>\n",
+        "esl::engine engine; example(engine);",
+        "std::cout << std::unitbuf;",
+        "std::cout << \"\\n@\\n\";",
+    ];
+    for (language, compiler, [head, call, prepare, mark]) in [("c", &c[..], of_c), ("cpp", &CPP, of_cpp)] {
+        // In one program, since the compiler takes its time for each.
+        let (mut text, mut main) = (head.to_owned(), prepare.to_owned());
+        for (number, task) in tasks.iter().enumerate() {
+            let code = block(task, language);
+            text += &format!("#define example example_{number}\n{code}\n#undef example\n");
+            main += &format!("\n{{ {} }} {mark}", call.replace("example", &format!("example_{number}")));
+        }
+        text += &format!("int main() {{\n{main}\n}}\n");
+        let file = library_folder().join(format!("capi-tasks.{language}"));
+        std::fs::write(&file, text).expect("it can be written");
+        let Some(text) = output(file.to_str().expect("it is text"), compiler, &[]) else {
+            say_left_out(&format!("a compiler for {language} is not installed"));
+            continue;
+        };
+        let printed: Vec<&str> = text.split("\n@\n").map(str::trim).collect();
+        let mut expected: Vec<String> =
+            tasks.iter().map(|task| block(task, "text").trim().to_owned()).collect();
+        expected.push(String::new());
+        assert_eq!(printed, expected, "{language}");
+    }
+    assert_eq!(tasks.len(), TASKS);
+}
+
 #[test]
 fn c_gets_what_the_header_promises() {
     assert_eq!(output("tests/api.c", &C, &[]).as_deref(), Some("0 faults\n"));
+}
+
+/// Calls in the time that a test has; more are made by hand, as the head of the program says.
+const RANDOM_CALLS: &str = "5000";
+
+#[test]
+fn calls_in_any_order_get_statuses() {
+    for seed in ["1", "2"] {
+        let ran = run_with("tests/fuzz.c", &C, &[], &[RANDOM_CALLS, seed]).expect("there is a C compiler");
+        let (text, errors) = (String::from_utf8_lossy(&ran.stdout), String::from_utf8_lossy(&ran.stderr));
+        assert!(
+            ran.status.success() && text.ends_with("0 faults\n"),
+            "seed {seed}: {:?}\n{text}\n{errors}",
+            ran.status
+        );
+    }
 }
 
 #[test]

@@ -41,6 +41,8 @@ use crate::error::{Error, NAME_MARKS};
 use crate::program;
 
 pub use call::{Call, Failure};
+pub use esl_vm::observe::{Observer, Seen};
+pub use esl_vm::task::TaskNumber;
 pub use executor::{Executor, HostFuture};
 pub use function::{Callable, Function};
 pub use handle::{Handle, Reply, TaskHandle};
