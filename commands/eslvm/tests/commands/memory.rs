@@ -1,7 +1,8 @@
 //! The resident memory of `eslvm` while programs use up what `--memory` allows, each in its own way.
 //!
 //! Guarantees: whatever a program fills the memory with, the process takes at most the limit and [`SLACK`]
-//! more than for a program that does nothing, and what hits the limit is a failure. Programs that give back what they use never reach it.
+//! more than for a program that does nothing, and what hits the limit is a failure. Programs that give back
+//! what they use never reach it.
 
 use std::path::Path;
 use std::process::{Child, Stdio};

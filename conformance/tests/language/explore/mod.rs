@@ -1,10 +1,12 @@
 //! Explores all schedules of small programs: proves what never happens, and finds what does.
 
 mod composition;
+mod corpus;
 mod defects;
 mod everywhere;
 mod fluents;
 mod keeping;
+mod oracle;
 mod putting_back;
 mod resources;
 mod suspension;
