@@ -20,6 +20,7 @@ pub mod opcode;
 pub mod operand;
 pub mod package;
 pub mod packed;
+pub mod properties;
 pub mod signature;
 pub mod span;
 pub mod symbol;

@@ -170,6 +170,8 @@ pub(super) struct MavlinkMessage {
     pub(super) base_length: usize,
     pub(super) length: usize,
     pub(super) fields: Vec<PayloadField>,
+    /// The keywords of the fields.
+    pub(super) keywords: Arc<[Datum]>,
     /// Places of the system and the component that a message is for.
     pub(super) target: (Option<usize>, Option<usize>),
 }
@@ -322,6 +324,7 @@ impl Dialect {
             base_length,
             length,
             target: (place("target_system"), place("target_component")),
+            keywords: fields.iter().map(|field| field.keyword.clone()).collect(),
             fields,
         }
     }

@@ -7,7 +7,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use esl_bytecode::datum::Datum;
@@ -222,12 +222,19 @@ impl LinkState {
                 vec![
                     decoded.clone(),
                     frame.message.keyword.clone(),
-                    i64::from(frame.system).into_datum(),
-                    i64::from(frame.component).into_datum(),
+                    byte(frame.system),
+                    byte(frame.component),
                 ]
             });
         }
     }
+}
+
+/// Returns the number of a system or a component, which each message has.
+fn byte(number: u8) -> Datum {
+    static BYTES: OnceLock<Vec<Datum>> = OnceLock::new();
+    let bytes = BYTES.get_or_init(|| (0..=255_i64).map(IntoDatum::into_datum).collect());
+    bytes[usize::from(number)].clone()
 }
 
 impl LinkCore {

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use esl_bytecode::Bytes;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::packed::PackedVector;
+use esl_bytecode::properties::PropertyValue;
 use esl_bytecode::span::Span;
 use esl_host::{HostFailure, IntoDatum};
 use num_traits::ToPrimitive;
@@ -62,11 +63,11 @@ fn bits(element: FieldType, bytes: &[u8]) -> u64 {
     }
 }
 
-fn integer(element: FieldType, bytes: &[u8]) -> Datum {
+fn integer(element: FieldType, bytes: &[u8]) -> PropertyValue {
     let bits = bits(element, bytes);
-    match element {
-        FieldType::Uint64 => Datum::integer(bits, Span::default()),
-        _ => Datum::integer(bits as i64, Span::default()),
+    match i64::try_from(bits) {
+        Err(_) if element == FieldType::Uint64 => Datum::integer(bits, Span::default()).into(),
+        _ => PropertyValue::Integer(bits.cast_signed()),
     }
 }
 
@@ -99,23 +100,27 @@ pub(super) fn datum_of_value(enumeration: &Enumeration, value: u64) -> Datum {
     Datum::list(found, Span::default())
 }
 
-fn read_field(field: &PayloadField, bytes: &[u8]) -> Datum {
+fn read_field(field: &PayloadField, bytes: &[u8]) -> PropertyValue {
     let element = field.element;
     let Some(count) = field.count else {
         return match &field.enumeration {
             Some(enumeration) => {
                 let width = 8 * element.size();
-                datum_of_value(enumeration, bits(element, bytes) & (u64::MAX >> (64 - width)))
+                datum_of_value(enumeration, bits(element, bytes) & (u64::MAX >> (64 - width))).into()
             }
             // Some vehicles send the bytes of an integer here, which a float that is not a number does not
             // keep.
             None if field.name == "param_value" && real(element, bytes).is_nan() => {
-                vec![keyword("BITS"), integer(FieldType::Uint32, bytes)].into_datum()
+                vec![keyword("BITS"), integer(FieldType::Uint32, bytes).to_datum()].into_datum().into()
             }
-            None if element.is_float() => real(element, bytes).into_datum(),
+            None if element.is_float() => PropertyValue::Float(real(element, bytes)),
             None => integer(element, bytes),
         };
     };
+    read_array(element, count, bytes).into()
+}
+
+fn read_array(element: FieldType, count: usize, bytes: &[u8]) -> Datum {
     let elements = bytes.chunks(element.size()).take(count);
     let packed = match element {
         FieldType::Char => {
@@ -128,7 +133,7 @@ fn read_field(field: &PayloadField, bytes: &[u8]) -> Datum {
             PackedVector::Floats(elements.map(|bytes| real(element, bytes)).collect())
         }
         FieldType::Uint64 => {
-            let numbers: Vec<Datum> = elements.map(|bytes| integer(element, bytes)).collect();
+            let numbers: Vec<Datum> = elements.map(|bytes| integer(element, bytes).to_datum()).collect();
             let small = elements_of_i64(&numbers);
             match small {
                 Some(small) => PackedVector::Integers(small),
@@ -161,10 +166,8 @@ impl IntoText for std::borrow::Cow<'_, str> {
 
 /// Returns the property list of a payload.
 pub(super) fn decode(message: &MavlinkMessage, payload: &PayloadBytes) -> Datum {
-    message.fields.iter().rev().fold(Datum::nil(Span::default()), |rest, field| {
-        let value = read_field(field, &payload[field.offset..]);
-        Datum::cons(field.keyword.clone(), Datum::cons(value, rest, Span::default()), Span::default())
-    })
+    let values = message.fields.iter().map(|field| read_field(field, &payload[field.offset..]));
+    Datum::properties(message.keywords.clone(), values.collect())
 }
 
 // ---- writing

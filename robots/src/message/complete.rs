@@ -90,12 +90,8 @@ fn complete_message(message_type: &MessageType, message: &Datum) -> MessageResul
         return Err(not_a_message(message_type, message));
     }
     let values = fields.iter().zip(given);
-    Ok(plist(
-        values
-            .rev()
-            .map(|(field, value)| (&field.keyword, value.unwrap_or_else(|| field.default.clone())))
-            .rev(),
-    ))
+    let values = values.map(|(field, value)| value.unwrap_or_else(|| field.default.clone()).into());
+    Ok(Datum::properties(message_type.keywords.clone(), values.collect()))
 }
 
 /// Returns the place of the field that a keyword names. Fields are mostly given in their order.

@@ -58,6 +58,8 @@ pub struct MessageField {
 pub struct MessageType {
     name: String,
     pub(super) fields: Vec<MessageField>,
+    /// The keywords of the fields.
+    pub(super) keywords: Arc<[Datum]>,
     pub(super) constants: Vec<MessageConstant>,
     /// Whether it is `builtin_interfaces/msg/Time` or `Duration`, for which a number of seconds may stand.
     pub(super) is_time: bool,
@@ -181,11 +183,13 @@ impl MessageType {
         }
         let hash = describe::hash(&own, &referenced);
         let defaults = complete::plist(fields.iter().map(|field| (&field.keyword, field.default.clone())));
+        let keywords = fields.iter().map(|field| field.keyword.clone()).collect();
         let is_time = matches!(&*name, "builtin_interfaces/msg/Time" | "builtin_interfaces/msg/Duration");
         let least_size = least_size.max(1);
         Ok(MessageType {
             name,
             fields,
+            keywords,
             constants,
             is_time,
             least_size,

@@ -8,13 +8,14 @@ use std::sync::Arc;
 use esl_bytecode::Bytes;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::packed::PackedVector;
+use esl_bytecode::properties::PropertyValue;
 use esl_bytecode::span::Span;
 
-use super::complete::{check_length, plist, step};
+use super::complete::{check_length, step};
 use super::definition::FieldExtent;
 use super::fault::{FieldStep, MessageFault, MessageProblem, MessageResult};
 use super::message_type::{Element, MessageField, MessageType};
-use super::scalar::{Scalar, boolean, float, vector};
+use super::scalar::{Scalar, boolean, vector};
 
 /// Greatest number of values of a message, elements of packed arrays apart. A program cannot take in more.
 const MAX_PARTS: usize = 1_000_000;
@@ -119,10 +120,10 @@ impl<'a> PayloadReader<'a> {
         for field in &message_type.fields {
             values.push(self.field(field).map_err(|fault| fault.inside(step(field)))?);
         }
-        Ok(plist(message_type.fields.iter().map(|field| &field.keyword).zip(values)))
+        Ok(Datum::properties(message_type.keywords.clone(), values))
     }
 
-    fn field(&mut self, field: &MessageField) -> MessageResult<Datum> {
+    fn field(&mut self, field: &MessageField) -> MessageResult<PropertyValue> {
         let least_size = match &field.element {
             Element::Scalar(scalar) => scalar.size(),
             Element::Text { .. } => 4,
@@ -138,14 +139,16 @@ impl<'a> PayloadReader<'a> {
             }
         };
         match field.element {
-            Element::Scalar(scalar) if scalar != Scalar::Bool => self.packed(scalar, count),
+            Element::Scalar(scalar) if scalar != Scalar::Bool => {
+                self.packed(scalar, count).map(PropertyValue::from)
+            }
             _ => {
                 let mut items = Vec::with_capacity(count.min(self.left()));
                 for index in 0..count {
                     let item = self.element(&field.element);
-                    items.push(item.map_err(|fault| fault.inside(FieldStep::Index(index)))?);
+                    items.push(item.map_err(|fault| fault.inside(FieldStep::Index(index)))?.to_datum());
                 }
-                Ok(vector(items))
+                Ok(vector(items).into())
             }
         }
     }
@@ -180,10 +183,10 @@ impl<'a> PayloadReader<'a> {
         Ok(Datum::new(DatumKind::Packed(packed), Span::default()))
     }
 
-    fn element(&mut self, element: &Element) -> MessageResult<Datum> {
+    fn element(&mut self, element: &Element) -> MessageResult<PropertyValue> {
         self.count_part()?;
         match element {
-            Element::Message(message) => self.message(message),
+            Element::Message(message) => self.message(message).map(PropertyValue::from),
             Element::Scalar(scalar) => self.scalar(*scalar),
             Element::Text { is_wide, most } => {
                 let text = if *is_wide { self.wide_text()? } else { self.text()? };
@@ -193,18 +196,18 @@ impl<'a> PayloadReader<'a> {
                         let expected = format!("at most {most}");
                         Err(MessageFault::new(MessageProblem::Length { expected, given: length }))
                     }
-                    _ => Ok(Datum::string(&text, Span::default())),
+                    _ => Ok(Datum::string(&text, Span::default()).into()),
                 }
             }
         }
     }
 
-    fn scalar(&mut self, scalar: Scalar) -> MessageResult<Datum> {
+    fn scalar(&mut self, scalar: Scalar) -> MessageResult<PropertyValue> {
         let size = scalar.size();
         let bytes = self.take(size, size)?;
         if scalar == Scalar::Bool {
             return match bytes[0] {
-                byte @ 0..=1 => Ok(boolean(byte == 1)),
+                byte @ 0..=1 => Ok(boolean(byte == 1).into()),
                 byte => Err(MessageFault::new(MessageProblem::Boolean(byte))),
             };
         }
@@ -215,13 +218,16 @@ impl<'a> PayloadReader<'a> {
         }
         let bits = u64::from_le_bytes(low);
         Ok(match scalar {
-            Scalar::Float32 => float(f32::from_bits(bits as u32).into()),
-            Scalar::Float64 => float(f64::from_bits(bits)),
-            Scalar::Int8 => Datum::integer(bits as i8, Span::default()),
-            Scalar::Int16 => Datum::integer(bits as i16, Span::default()),
-            Scalar::Int32 => Datum::integer(bits as i32, Span::default()),
-            Scalar::Int64 => Datum::integer(bits.cast_signed(), Span::default()),
-            _ => Datum::integer(bits, Span::default()),
+            Scalar::Float32 => PropertyValue::Float(f32::from_bits(bits as u32).into()),
+            Scalar::Float64 => PropertyValue::Float(f64::from_bits(bits)),
+            Scalar::Int8 => PropertyValue::Integer((bits as i8).into()),
+            Scalar::Int16 => PropertyValue::Integer((bits as i16).into()),
+            Scalar::Int32 => PropertyValue::Integer((bits as i32).into()),
+            Scalar::Int64 => PropertyValue::Integer(bits.cast_signed()),
+            _ => match i64::try_from(bits) {
+                Ok(integer) => PropertyValue::Integer(integer),
+                Err(_) => Datum::integer(bits, Span::default()).into(),
+            },
         })
     }
 

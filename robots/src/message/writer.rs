@@ -3,6 +3,7 @@
 use esl_bytecode::Bytes;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::packed::PackedVector;
+use esl_bytecode::properties::PropertyValue;
 
 use super::complete::complete;
 use super::definition::FieldExtent;
@@ -45,6 +46,16 @@ impl PayloadWriter {
     fn message(&mut self, message_type: &MessageType, message: &Datum) {
         if message_type.fields.is_empty() {
             self.bytes.push(0);
+        }
+        // As [`complete`] has made it, unless somebody has looked into it as a list.
+        if let Some(properties) = message.as_properties() {
+            for (field, value) in message_type.fields.iter().zip(properties.values()) {
+                match value {
+                    PropertyValue::Datum(datum) => self.field(field, datum),
+                    scalar => self.field(field, &scalar.to_datum()),
+                }
+            }
+            return;
         }
         let mut rest = message;
         for field in &message_type.fields {

@@ -315,14 +315,14 @@ fn add_services(rows: &mut HostRows, types: &Types) {
         },
     );
     rows.operation(
-        spawned,
+        ready_soon,
         "%ROS-RESPOND",
         ["call", "response"],
         "Answers a call.",
         |call: HostHandle<UnansweredCall>, response: Datum| async move { call.respond(&response).await },
     );
     rows.operation(
-        spawned,
+        ready_soon,
         "%ROS-REFUSE",
         ["call", "text"],
         "Answers a call by an error.",

@@ -307,7 +307,7 @@ fn add_queries(rows: &mut HostRows) {
         },
     );
     rows.operation(
-        spawned,
+        ready_soon,
         "%ZENOH-REPLY",
         ["query", "key", "payload", "encoding", "attachment"],
         "Replies PAYLOAD to QUERY, under KEY or that of the query.",
@@ -321,7 +321,7 @@ fn add_queries(rows: &mut HostRows) {
         },
     );
     rows.operation(
-        spawned,
+        ready_soon,
         "%ZENOH-REPLY-ERROR",
         ["query", "text"],
         "Replies an error to QUERY.",

@@ -53,12 +53,13 @@ pub(crate) fn import(
     names: &mut Names,
     datum: &Datum,
 ) -> Result<(Value, usize), AllocError> {
-    if let DatumKind::String(text) = datum.kind() {
-        return Ok((heap.alloc_str(text)?, work_of(datum)));
+    let mut unit = Unit { is_from_host: true, ..Unit::default() };
+    if datum.is_compound() {
+        return Ok((unit.value_of(heap, names, datum)?, unit.take_work() as usize));
     }
-    let mut unit = Unit::default();
-    if !datum.is_compound() {
-        return Ok((unit.atom_value(heap, names, datum)?, work_of(datum)));
-    }
-    Ok((unit.value_of(heap, names, datum)?, unit.take_work() as usize))
+    let value = match datum.kind() {
+        DatumKind::String(text) => heap.alloc_str(text)?,
+        _ => unit.atom_value(heap, names, datum, false)?,
+    };
+    Ok((value, work_of(datum)))
 }

@@ -15,12 +15,16 @@
 mod border;
 mod environment;
 mod packed;
+mod parts;
+mod properties;
 mod walk;
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 
 use esl_bytecode::datum::{Datum, DatumKind, DatumRemains, ObjectId};
+use esl_bytecode::properties::PropertyList;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Home, Symbol, symbol_of_setf_cell};
 
@@ -32,8 +36,9 @@ use crate::value::Value;
 use border::work_of;
 pub(crate) use border::{export, import};
 use environment::Environments;
+use parts::{are_parts, datum_with};
 pub(crate) use walk::DatumWalk;
-use walk::{ObjectParts, parts_of, plain_kind};
+use walk::{parts_of, plain_kind};
 
 /// Greatest number of nodes of an object that becomes a datum.
 const MAX_NODES: usize = 4_000_000;
@@ -91,6 +96,9 @@ pub(crate) struct Unit {
     work: u64,
     /// Whether the data are for the embedder, which gets its own objects back.
     is_for_embedder: bool,
+    /// Whether the data come from the host, and no object has to be led back to its datum: then only nodes
+    /// that may occur twice are remembered.
+    is_from_host: bool,
 }
 
 /// The remains of a unit that is given up, which are freed in parts.
@@ -148,6 +156,7 @@ impl SharedObjects for Unit {
 enum ToValue<'a> {
     Visit(&'a Datum),
     Build(&'a Datum),
+    BuildProperties(&'a Datum, &'a PropertyList),
 }
 
 impl Unit {
@@ -215,12 +224,21 @@ impl Unit {
         }
         let mut steps = vec![ToValue::Visit(datum)];
         let mut made: Vec<Value> = Vec::new();
+        let mut remembers_all = !self.is_from_host;
         while let Some(step) = steps.pop() {
             match step {
                 ToValue::Visit(datum) => {
                     self.work += 1;
-                    if let Some(&(_, value)) = self.values.get(&(datum.identity() as u64)) {
+                    if (remembers_all || datum.is_shared())
+                        && let Some(&(_, value)) = self.values.get(&(datum.identity() as u64))
+                    {
                         made.push(value);
+                        continue;
+                    }
+                    if let Some(properties) = datum.as_properties() {
+                        self.work += properties::work_of(properties) as u64 - 1;
+                        steps.push(ToValue::BuildProperties(datum, properties));
+                        steps.extend(properties.data().rev().map(ToValue::Visit));
                         continue;
                     }
                     match datum.kind() {
@@ -228,6 +246,8 @@ impl Unit {
                             steps.extend([ToValue::Build(datum), ToValue::Visit(cdr), ToValue::Visit(car)]);
                         }
                         DatumKind::Vector(items) | DatumKind::Array(_, items) => {
+                            // Its elements may be those of another vector too.
+                            remembers_all |= Arc::strong_count(items) > 1;
                             steps.push(ToValue::Build(datum));
                             steps.extend(items.iter().rev().map(ToValue::Visit));
                         }
@@ -236,27 +256,41 @@ impl Unit {
                         }
                         _ => {
                             self.work += work_of(datum) as u64 - 1;
-                            made.push(self.atom_value(heap, names, datum)?);
+                            let is_remembered = remembers_all || datum.is_shared();
+                            made.push(self.atom_value(heap, names, datum, is_remembered)?);
                         }
                     }
                 }
                 ToValue::Build(datum) => {
-                    let parts = match datum.kind() {
+                    let count = match datum.kind() {
                         DatumKind::Vector(items) | DatumKind::Array(_, items) => items.len(),
                         DatumKind::Call(_) => 1,
                         _ => 2,
                     };
-                    let parts = made.split_off(made.len() - parts);
+                    let first = made.len() - count;
+                    let parts = &made[first..];
                     let value = match datum.kind() {
-                        DatumKind::Vector(_) => heap.alloc_vector(&parts)?,
-                        DatumKind::Array(dimensions, _) => array(heap, dimensions, &parts)?,
+                        DatumKind::Vector(_) => heap.alloc_vector(parts)?,
+                        DatumKind::Array(dimensions, _) => array(heap, dimensions, parts)?,
                         DatumKind::Call(_) => {
                             self.calls.push(parts[0]);
                             parts[0]
                         }
                         _ => heap.cons(parts[0], parts[1])?,
                     };
-                    self.remember(datum, value);
+                    made.truncate(first);
+                    if remembers_all || datum.is_shared() {
+                        self.remember(datum, value);
+                    }
+                    made.push(value);
+                }
+                ToValue::BuildProperties(datum, properties) => {
+                    let first = made.len() - properties.data().count();
+                    let value = properties::value_of(heap, names, properties, &made[first..])?;
+                    made.truncate(first);
+                    if remembers_all || datum.is_shared() {
+                        self.remember(datum, value);
+                    }
                     made.push(value);
                 }
             }
@@ -264,7 +298,14 @@ impl Unit {
         Ok(made.pop().unwrap_or(Value::NIL))
     }
 
-    fn atom_value(&mut self, heap: &mut Heap, names: &mut Names, datum: &Datum) -> Result<Value, AllocError> {
+    /// Returns the object of a datum that is not compound. One that `is_remembered` is the same object again.
+    fn atom_value(
+        &mut self,
+        heap: &mut Heap,
+        names: &mut Names,
+        datum: &Datum,
+        is_remembered: bool,
+    ) -> Result<Value, AllocError> {
         Ok(match datum.kind() {
             DatumKind::Symbol(symbol) => self.symbol_object(heap, names, symbol)?,
             DatumKind::Integer(value) => integer(heap, value)?,
@@ -273,7 +314,9 @@ impl Unit {
             DatumKind::Character(c) => character(*c),
             DatumKind::String(text) => {
                 let value = heap.alloc_str(text)?;
-                self.remember(datum, value);
+                if is_remembered {
+                    self.remember(datum, value);
+                }
                 value
             }
             DatumKind::Object(id) => self.pinned(*id).unwrap_or(Value::NIL),
@@ -335,6 +378,10 @@ impl Unit {
     /// Returns the datum of an object with these parts: the one from which it was made, unless its parts have
     /// changed.
     fn compound(&mut self, heap: &Heap, object: Value, parts: Vec<Datum>, span: Span) -> Datum {
+        if self.is_for_embedder {
+            // The walk knows the objects that it has met, and no object was made from a datum.
+            return datum_with(heap, object, parts, span);
+        }
         let known = self.data.get(&object.bits()).map(|(_, datum)| datum.clone());
         // A literal returned by a macro repeatedly is at another place each time.
         let is_made = self.made.contains(&object.bits());
@@ -348,21 +395,7 @@ impl Unit {
             self.made.insert(object.bits());
         }
         let span = known.filter(|_| !is_made).map_or(span, |known| known.span());
-        let datum = match parts_of(heap, object) {
-            Some(ObjectParts::Items(Some(dimensions), _)) => {
-                let dimensions = dimensions.iter().map(|size| size.as_index().unwrap_or(0) as u32).collect();
-                Datum::new(DatumKind::Array(dimensions, parts.into()), span)
-            }
-            Some(ObjectParts::Pair(..)) => {
-                let mut parts = parts.into_iter();
-                match (parts.next(), parts.next()) {
-                    (Some(car), Some(cdr)) => Datum::cons(car, cdr, span),
-                    _ => Datum::nil(span),
-                }
-            }
-            // Only for the embedder vectors of all kinds have parts.
-            Some(ObjectParts::Items(None, _)) | None => Datum::new(DatumKind::Vector(parts.into()), span),
-        };
+        let datum = datum_with(heap, object, parts, span);
         self.remember(&datum, object);
         datum
     }
@@ -433,35 +466,6 @@ impl Unit {
         self.note_uninterned(id, object);
         Some(Symbol::uninterned(id, &name))
     }
-}
-
-/// Returns whether `datum` has exactly these parts.
-fn are_parts(datum: &Datum, parts: &[Datum]) -> bool {
-    match datum.kind() {
-        DatumKind::Cons(car, cdr) => {
-            parts.len() == 2 && is_equivalent(car, &parts[0]) && is_equivalent(cdr, &parts[1])
-        }
-        DatumKind::Vector(items) | DatumKind::Array(_, items) => {
-            items.len() == parts.len() && items.iter().zip(parts).all(|(a, b)| is_equivalent(a, b))
-        }
-        _ => false,
-    }
-}
-
-/// Returns whether both are the same node, or atoms that a program cannot distinguish.
-fn is_equivalent(a: &Datum, b: &Datum) -> bool {
-    a.is_same(b)
-        || match (a.kind(), b.kind()) {
-            (DatumKind::Nil, DatumKind::Nil) => true,
-            (DatumKind::Symbol(a), DatumKind::Symbol(b)) => a == b,
-            (DatumKind::Integer(a), DatumKind::Integer(b)) => a == b,
-            (DatumKind::Ratio(a, b), DatumKind::Ratio(c, d)) => (a, b) == (c, d),
-            (DatumKind::Float(a), DatumKind::Float(b)) => a.to_bits() == b.to_bits(),
-            (DatumKind::Character(a), DatumKind::Character(b)) => a == b,
-            (DatumKind::Object(a), DatumKind::Object(b)) => a == b,
-            (DatumKind::Opaque(a), DatumKind::Opaque(b)) => a == b,
-            _ => false,
-        }
 }
 
 #[cfg(test)]

@@ -15,15 +15,32 @@ use crate::value::Value;
 /// # Errors
 /// As for every allocation.
 pub(super) fn value_of(heap: &mut Heap, vector: &PackedVector) -> Result<Value, AllocError> {
-    let elements: Vec<Value> = match vector {
+    let mut elements = Vec::with_capacity(vector.len());
+    match vector {
         PackedVector::Bytes(bytes) => return heap.alloc_bytes(bytes),
-        PackedVector::Floats(floats) => floats.iter().map(|&x| heap.float(x)).collect::<Result<_, _>>()?,
-        PackedVector::Integers(integers) => {
-            let mut value = |&n: &i64| Value::fixnum(n).map_or_else(|| integer(heap, &n.into()), Ok);
-            integers.iter().map(&mut value).collect::<Result<_, _>>()?
+        PackedVector::Floats(floats) => {
+            for &x in floats.iter() {
+                elements.push(heap.float(x)?);
+            }
         }
-    };
+        PackedVector::Integers(integers) => {
+            for &n in integers.iter() {
+                elements.push(integer_of(heap, n)?);
+            }
+        }
+    }
     heap.alloc_vector(&elements)
+}
+
+/// Returns an integer.
+///
+/// # Errors
+/// As for every allocation.
+pub(super) fn integer_of(heap: &mut Heap, n: i64) -> Result<Value, AllocError> {
+    match Value::fixnum(n) {
+        Some(value) => Ok(value),
+        None => integer(heap, &n.into()),
+    }
 }
 
 /// Returns the datum that a vector is as a whole: bytes, if its elements are bytes or bits by their type;

@@ -1,5 +1,6 @@
 use super::*;
 use esl_bytecode::BigInt;
+use esl_bytecode::properties::PropertyValue;
 use esl_bytecode::span::SourceId;
 
 struct Fixture {
@@ -145,4 +146,87 @@ fn depth_takes_no_native_stack() {
     fixture.unit = Unit::default();
     let back = fixture.datum_of(value).unwrap();
     assert!(!back.is_nil());
+}
+
+#[test]
+fn parts_of_data_from_the_host_stay_shared_and_are_walked_once() {
+    let mut fixture = Fixture::new();
+    let mut import = |datum: &Datum| import(&mut fixture.heap, &mut fixture.names, datum).unwrap();
+    // As many leaves as no machine could walk, in conses and in vectors with the same elements.
+    let mut conses = Datum::list([int(1, 0)], at(0));
+    let mut vectors = conses.clone();
+    for _ in 0..100 {
+        conses = Datum::list([conses.clone(), conses], at(0));
+        let items: Arc<[Datum]> = [vectors.clone(), vectors].into();
+        let one = Datum::new(DatumKind::Vector(items.clone()), at(0));
+        vectors = Datum::list([one, Datum::new(DatumKind::Vector(items), at(0))], at(0));
+    }
+    let (list, work) = import(&conses);
+    assert!(work < 1000, "{work}");
+    import(&vectors);
+    let heap = &fixture.heap;
+    assert_eq!(heap.car(list).unwrap(), heap.car(heap.cdr(list).unwrap()).unwrap());
+}
+
+#[test]
+fn a_property_list_of_the_host_is_the_list_that_it_stands_for_and_costs_as_much() {
+    let keys = |names: &[&str]| -> Arc<[Datum]> {
+        names.iter().map(|name| Datum::symbol(Symbol::keyword(name), Span::default())).collect()
+    };
+    let make = || {
+        let text = Datum::string("text", Span::default());
+        let inner = Datum::properties(
+            keys(&["X", "Y"]),
+            vec![PropertyValue::Float(0.5), PropertyValue::Integer(i64::MIN)],
+        );
+        let values = vec![
+            PropertyValue::Integer(-7),
+            inner.clone().into(),
+            text.into(),
+            Datum::nil(Span::default()).into(),
+            inner.into(),
+        ];
+        let outer = Datum::properties(keys(&["A", "B", "C", "D", "E"]), values);
+        Datum::list([outer.clone(), outer], Span::default())
+    };
+    let mut fixture = Fixture::new();
+    let (packed, listed) = (make(), make());
+    // A datum whose text is asked for becomes a list.
+    let inner = "(:X 0.5 :Y -9223372036854775808)";
+    let outer = format!("(:A -7 :B {inner} :C \"text\" :D NIL :E {inner})");
+    assert_eq!(listed.to_string(), format!("({outer} {outer})"));
+    let mut import = |datum: &Datum| import(&mut fixture.heap, &mut fixture.names, datum).unwrap();
+    let ((one, work), (other, work_of_list)) = (import(&packed), import(&listed));
+    assert_eq!(work, work_of_list);
+    assert_eq!(fixture.datum_of(one).unwrap().to_string(), fixture.datum_of(other).unwrap().to_string());
+    // A datum that occurs twice is one object.
+    for list in [one, other] {
+        let heap = &fixture.heap;
+        let first = heap.car(list).unwrap();
+        assert_eq!(first, heap.car(heap.cdr(list).unwrap()).unwrap());
+        let rest = (0..3).fold(first, |rest, _| heap.cdr(rest).unwrap());
+        let last = (0..6).fold(rest, |rest, _| heap.cdr(rest).unwrap());
+        assert_eq!(heap.car(rest).unwrap(), heap.car(last).unwrap());
+    }
+}
+
+#[test]
+fn shared_and_circular_objects_are_seen_on_the_way_to_the_host() {
+    let mut fixture = Fixture::new();
+    let heap = &mut fixture.heap;
+    // As many leaves as no machine could walk.
+    let mut tree = heap.list(&[Value::T]).unwrap();
+    for n in 0..100 {
+        tree = match n % 2 {
+            0 => heap.cons(tree, tree).unwrap(),
+            _ => heap.alloc_vector(&[tree, tree, Value::NIL]).unwrap(),
+        };
+    }
+    let (datum, work) = export(&fixture.heap, &fixture.names, tree).unwrap();
+    assert!(work < 1000, "{work}");
+    let DatumKind::Vector(items) = datum.kind() else { panic!("{datum}") };
+    assert!(items[0].is_same(&items[1]));
+    let pair = fixture.heap.cons(Value::T, Value::NIL).unwrap();
+    fixture.heap.set_cdr(pair, pair).unwrap();
+    assert_eq!(export(&fixture.heap, &fixture.names, pair).unwrap_err(), DatumError::Circular);
 }

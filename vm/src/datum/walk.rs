@@ -178,8 +178,14 @@ impl DatumWalk {
                     }
                 }
                 Some(ToDatum::Build(object, count)) => {
-                    let parts = self.made.split_off(self.made.len() - count);
-                    let datum = unit.compound(heap, object, parts, span);
+                    let datum = if unit.is_for_embedder && heap.as_cons(object).is_some() {
+                        let cdr = self.made.pop().unwrap_or_else(|| Datum::nil(span));
+                        let car = self.made.pop().unwrap_or_else(|| Datum::nil(span));
+                        Datum::cons(car, cdr, span)
+                    } else {
+                        let parts = self.made.split_off(self.made.len() - count);
+                        unit.compound(heap, object, parts, span)
+                    };
                     self.met.insert(object.bits(), (object, Some(datum.clone())));
                     self.made.push(datum);
                 }

@@ -15,6 +15,7 @@ use bytes::Bytes;
 use num_bigint::BigInt;
 
 use crate::packed::PackedVector;
+use crate::properties::{PropertyList, PropertyValue};
 use crate::span::Span;
 use crate::symbol::Symbol;
 
@@ -114,9 +115,17 @@ impl fmt::Display for OpaqueDatum {
     }
 }
 
+/// Contents of a node.
+#[derive(Debug)]
+enum NodeContents {
+    Plain(DatumKind),
+    /// A list, which is made if it is asked for.
+    Properties(PropertyList),
+}
+
 #[derive(Debug)]
 struct DatumNode {
-    kind: DatumKind,
+    kind: NodeContents,
     span: Span,
     /// [`HAS_CALLS`], [`HAS_OBJECTS`]
     contents: u8,
@@ -147,7 +156,18 @@ impl Datum {
     /// Returns a datum of the given kind.
     pub fn new(kind: DatumKind, span: Span) -> Datum {
         let contents = contents(&kind);
-        Datum(Arc::new(DatumNode { kind, span, contents }))
+        Datum(Arc::new(DatumNode { kind: NodeContents::Plain(kind), span, contents }))
+    }
+
+    /// Returns a property list of `keys`, symbols, and as many `values`.
+    pub fn properties(keys: Arc<[Datum]>, values: Vec<PropertyValue>) -> Datum {
+        let span = Span::default();
+        if keys.is_empty() {
+            return Datum::nil(span);
+        }
+        let properties = PropertyList::new(keys, values);
+        let contents = properties.data().fold(0, |all, datum| all | datum.0.contents);
+        Datum(Arc::new(DatumNode { kind: NodeContents::Properties(properties), span, contents }))
     }
 
     /// As [`Datum::new`], of a kind that may be the symbol `COMMON-LISP:NIL`.
@@ -208,14 +228,39 @@ impl Datum {
 
     /// Returns the contents.
     pub fn kind(&self) -> &DatumKind {
-        &self.0.kind
+        let mut datum = self;
+        loop {
+            match &datum.0.kind {
+                NodeContents::Plain(kind) => return kind,
+                NodeContents::Properties(properties) => datum = properties.list(),
+            }
+        }
+    }
+
+    /// Returns the property list that this is, if nobody has asked for its parts as data: the program gets
+    /// the same list either way.
+    pub fn as_properties(&self) -> Option<&PropertyList> {
+        match &self.0.kind {
+            NodeContents::Properties(properties) if !properties.has_list() => Some(properties),
+            _ => None,
+        }
+    }
+
+    /// Returns the contents of what is not a property list.
+    fn plain_kind(&self) -> Option<&DatumKind> {
+        match &self.0.kind {
+            NodeContents::Plain(kind) => Some(kind),
+            NodeContents::Properties(_) => None,
+        }
     }
 
     /// Returns whether it consists of other data.
     pub fn is_compound(&self) -> bool {
         matches!(
-            self.kind(),
-            DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) | DatumKind::Call(_)
+            self.plain_kind(),
+            None | Some(
+                DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) | DatumKind::Call(_)
+            )
         )
     }
 
@@ -234,6 +279,12 @@ impl Datum {
         Arc::as_ptr(&self.0).addr()
     }
 
+    /// Returns whether anything else refers to this node too. `false` means that it occurs once in the datum
+    /// around it, unless it is an element of a slice that two vectors share.
+    pub fn is_shared(&self) -> bool {
+        Arc::strong_count(&self.0) > 1
+    }
+
     /// Returns whether this is or contains a call that is still to be made.
     pub fn has_calls(&self) -> bool {
         self.0.contents & HAS_CALLS != 0
@@ -246,13 +297,13 @@ impl Datum {
 
     /// Returns whether this is `NIL`.
     pub fn is_nil(&self) -> bool {
-        matches!(self.kind(), DatumKind::Nil)
+        matches!(self.plain_kind(), Some(DatumKind::Nil))
     }
 
     /// Returns the symbol that this is, `NIL` apart.
     pub fn as_symbol(&self) -> Option<&Symbol> {
-        match self.kind() {
-            DatumKind::Symbol(symbol) => Some(symbol),
+        match self.plain_kind() {
+            Some(DatumKind::Symbol(symbol)) => Some(symbol),
             _ => None,
         }
     }
@@ -341,8 +392,12 @@ impl DatumRemains {
 }
 
 /// Moves the children of a node that is about to go to `orphans`, leaving the node flat.
-fn release(kind: &mut DatumKind, orphans: &mut Vec<Datum>) {
+fn release(kind: &mut NodeContents, orphans: &mut Vec<Datum>) {
     use DatumKind::{Array, Call, Cons, Vector};
+    let kind = match kind {
+        NodeContents::Plain(kind) => kind,
+        NodeContents::Properties(properties) => return orphans.extend(properties.take_data()),
+    };
     if !matches!(kind, Cons(..) | Vector(..) | Array(..) | Call(_)) {
         return;
     }
@@ -437,30 +492,4 @@ fn display_items(items: &[Datum], open: &str, f: &mut fmt::Formatter<'_>, depth:
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_deep_datum_is_dropped_without_native_recursion() {
-        let span = Span::default();
-        let mut deep = Datum::nil(span);
-        for _ in 0..1_000_000 {
-            deep = Datum::list([deep], span);
-        }
-        let mut vectors = Datum::nil(span);
-        for _ in 0..200_000 {
-            vectors = Datum::new(DatumKind::Vector([vectors].into()), span);
-        }
-        drop(deep);
-        drop(vectors);
-    }
-
-    #[test]
-    fn a_list_gives_its_elements_and_its_tail() {
-        let span = Span::default();
-        let dotted = Datum::list_with_tail([Datum::integer(1, span)], Datum::integer(2, span), span);
-        assert!(dotted.as_list().is_none());
-        assert_eq!(dotted.to_string(), "(1 . 2)");
-        assert_eq!(Datum::symbol(Symbol::cl("NIL"), span).to_string(), "NIL");
-    }
-}
+mod tests;
