@@ -116,6 +116,7 @@ pub(crate) fn install(machine: &mut Vm) {
             Ok(module.map(|module| definitions(&(module.rows)(&for_definitions))))
         },
     );
+    rows.at_once("%TIME-NOW", [], "Returns NIL: the program's clock tells the time.", || Ok(None::<f64>));
     rows.into_iter().for_each(|row| machine.add_host_row(row));
     let everywhere = all_rows(&inbox).filter(|row| row.is_everywhere);
     everywhere.for_each(|row| machine.add_host_row(row));

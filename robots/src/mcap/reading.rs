@@ -7,7 +7,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use esl_bytecode::datum::Datum;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::packed::PackedVector;
+use esl_bytecode::span::Span;
 use esl_host::{HostFailure, HostObject, IntoDatum, Keyword};
 
 use super::bag::McapBag;
@@ -184,14 +186,14 @@ impl McapInput {
             end: end.map(|end| first.saturating_add(end)),
         };
         let state =
-            ReaderState { ordered: None, next: 0, kept: BTreeMap::new(), bytes: 0, forms: HashMap::new() };
+            ReaderState { ordered: None, next: 0, kept: BTreeMap::new(), bytes: 0, channels: HashMap::new() };
         Ok(McapReader { bag, selection, state: Mutex::new(state) })
     }
 }
 
 /// Returns an unsigned number as data.
 fn time(nanoseconds: u64) -> Datum {
-    Datum::integer(nanoseconds, esl_bytecode::span::Span::default())
+    Datum::integer(nanoseconds, Span::default())
 }
 
 /// A reader of messages in batches.
@@ -212,13 +214,60 @@ struct ReaderState {
     /// Batches, each with the bytes of its payloads.
     kept: BTreeMap<u64, (Datum, usize)>,
     bytes: usize,
-    /// Forms of payloads, by file and channel.
-    forms: HashMap<(usize, u16), MessageForm>,
+    /// Channels, by file and number.
+    channels: HashMap<(usize, u16), ReadChannel>,
+}
+
+/// A channel whose messages are read.
+struct ReadChannel {
+    topic: Datum,
+    form: MessageForm,
+}
+
+/// The messages of a batch, by their parts.
+#[derive(Default)]
+struct MessageColumns {
+    topics: Vec<Datum>,
+    times: Vec<u64>,
+    publish_times: Vec<u64>,
+    sequences: Vec<u64>,
+    forms: Vec<Datum>,
+    payloads: Vec<Datum>,
+}
+
+impl MessageColumns {
+    /// Returns the columns as a list of vectors; the empty list without messages.
+    fn into_datum(self) -> Datum {
+        if self.topics.is_empty() {
+            return Datum::nil(Span::default());
+        }
+        let columns = [
+            vector(self.topics),
+            numbers(&self.times),
+            numbers(&self.publish_times),
+            numbers(&self.sequences),
+            vector(self.forms),
+            vector(self.payloads),
+        ];
+        Datum::list(columns, Span::default())
+    }
+}
+
+fn vector(items: Vec<Datum>) -> Datum {
+    Datum::new(DatumKind::Vector(items.into()), Span::default())
+}
+
+/// Returns unsigned numbers as a vector.
+fn numbers(numbers: &[u64]) -> Datum {
+    match numbers.iter().map(|&number| i64::try_from(number)).collect::<Result<Arc<[i64]>, _>>() {
+        Ok(integers) => Datum::new(DatumKind::Packed(PackedVector::Integers(integers)), Span::default()),
+        Err(_) => vector(numbers.iter().map(|&number| time(number)).collect()),
+    }
 }
 
 impl McapReader {
-    /// Returns a batch: a list of messages, each a list of topic, time, time of publication, sequence number,
-    /// form and payload. An empty one is the end. With `is_raw`, payloads are bytes.
+    /// Returns a batch: a list of vectors of the topics of messages, their times, times of publication,
+    /// sequence numbers, forms and payloads. An empty one is the end. With `is_raw`, payloads are bytes.
     pub(super) fn batch(&self, number: u64, is_raw: bool) -> Result<Datum, HostFailure> {
         let mut state = lock(&self.state);
         if let Some((batch, _)) = state.kept.get(&number) {
@@ -254,34 +303,31 @@ impl ReaderState {
     }
 
     fn make(&mut self, bag: &mut McapBag, is_raw: bool) -> Result<(Datum, usize), HostFailure> {
-        let mut messages = Vec::new();
+        let mut columns = MessageColumns::default();
         let mut bytes = 0;
-        while messages.len() < MESSAGES && bytes < BYTES {
+        while columns.topics.len() < MESSAGES && bytes < BYTES {
             let Some(ordered) = &mut self.ordered else { break };
             let Some(message) = ordered.next(&mut bag.files)? else { break };
             bytes += message.data.len();
-            messages.push(self.described(message, is_raw));
+            self.add(&mut columns, &message, is_raw);
         }
-        // A list takes some hundred bytes for each message, too.
-        bytes += messages.len() * 256;
-        Ok((messages.into_datum(), bytes))
+        // The data take some hundred bytes for each message, too.
+        bytes += columns.topics.len() * 256;
+        Ok((columns.into_datum(), bytes))
     }
 
-    fn described(&mut self, message: McapMessage, is_raw: bool) -> Datum {
-        let McapMessage { file, channel, sequence, log_time, publish_time, data } = message;
-        let form = match is_raw {
-            true => &MessageForm::Bytes,
-            false => self.forms.entry((file, channel.id)).or_insert_with(|| MessageForm::of(&channel)),
-        };
-        let DecodedPayload { form, data } = form.decode(&channel.topic, &data);
-        let parts = [
-            channel.topic.as_str().into_datum(),
-            time(log_time),
-            time(publish_time),
-            sequence.into_datum(),
-            Keyword(form).into_datum(),
-            data,
-        ];
-        parts.to_vec().into_datum()
+    fn add(&mut self, columns: &mut MessageColumns, message: &McapMessage, is_raw: bool) {
+        let channel = &message.channel;
+        let read = self.channels.entry((message.file, channel.id)).or_insert_with(|| ReadChannel {
+            topic: channel.topic.as_str().into_datum(),
+            form: if is_raw { MessageForm::Bytes } else { MessageForm::of(channel) },
+        });
+        let DecodedPayload { form, data } = read.form.decode(&channel.topic, &message.data);
+        columns.topics.push(read.topic.clone());
+        columns.times.push(message.log_time);
+        columns.publish_times.push(message.publish_time);
+        columns.sequences.push(message.sequence.into());
+        columns.forms.push(Keyword(form).into_datum());
+        columns.payloads.push(data);
     }
 }

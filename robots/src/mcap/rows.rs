@@ -120,7 +120,7 @@ fn add_readers(rows: &mut HostRows) {
         },
     )
     .everywhere();
-    let batch = "Returns the messages of the batch with this NUMBER; none at the end.";
+    let batch = "Returns the messages of the batch with this NUMBER, by their parts; NIL at the end.";
     rows.operation(
         spawned,
         "%MCAP-BATCH",

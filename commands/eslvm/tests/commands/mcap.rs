@@ -208,7 +208,11 @@ fn files_need_rights_and_have_to_be_of_mcap() {
 (refused (mcap:with-file (f \"none/a.mcap\" :direction :output) f))
 (refused (mcap:with-file (f \"b.mcap\" :direction :output)
            (mcap:write (mcap:channel f \"/a\" :type \"std_msgs/msg/String\") '(:dat \"x\"))))
-(refused (mcap:with-file (f \"b.mcap\" :direction :output) (mcap:channel f \"/a\" :type \"a/msg/B\")))";
+(refused (mcap:with-file (f \"b.mcap\" :direction :output) (mcap:channel f \"/a\" :type \"a/msg/B\")))
+(mcap:with-file (f \"c.mcap\" :direction :output)
+  (mcap:write (mcap:channel f \"/j\" :encoding \"json\") \"{1\"))
+(print (handler-case (mcap:with-file (f \"c.mcap\") (mcap:next (mcap:read f)))
+         (failure (f) (cons (failure-cause f) (failure-arguments f)))))";
     let folder = Folder::with("mcap-rights", &[("main.esl", text), ("a.txt", "text"), ("folder/x", "")]);
     let done = run(&folder, &["run", "main.esl"]);
     for text in [
@@ -220,6 +224,7 @@ fn files_need_rights_and_have_to_be_of_mcap() {
         "none/a.mcap: No such file",
         ":dat",
         "a/msg/B",
+        "(:MALFORMED-MESSAGE \"Line 1, column 2",
     ] {
         assert!(done.output.contains(text), "{text}: {}\n{}", done.output, done.errors);
     }
@@ -307,6 +312,16 @@ fn a_run_is_a_file_that_others_read() {
     // Recording changes nothing in the run.
     let done = run(&folder, &["replay", "run.eslj", "--check"]);
     assert!(done.output.starts_with("equal: ") && done.status == Some(0), "{}{}", done.output, done.errors);
+}
+
+#[test]
+fn asking_for_the_time_is_not_a_failure_of_the_run() {
+    let text = "(require :time) (dotimes (i 3) (sleep 1) (format t \"~d~%\" (round (time:unix))))";
+    let folder = Folder::with("mcap-time", &[("main.esl", text)]);
+    let done = run(&folder, &["run", "--clock", "virtual", "--mcap", "run.mcap", "main.esl"]);
+    assert_eq!(done.output, "946684801\n946684802\n946684803\n", "{}", done.errors);
+    let info = run(&folder, &["mcap", "info", "run.mcap"]);
+    assert!(info.output.contains("/esl/tasks") && !info.output.contains("/esl/failures"), "{}", info.output);
 }
 
 #[test]
