@@ -53,6 +53,7 @@ fn none(inbox: &Inbox) -> HostRows {
 pub const MODULES: &[HostModule] = &[
     HostModule { name: "bt", text: include_str!("../modules/bt.esl"), rows: rows::rows },
     HostModule { name: "bt-control", text: include_str!("../modules/bt-control.esl"), rows: none },
+    HostModule { name: "bt-custom", text: include_str!("../modules/bt-custom.esl"), rows: none },
     HostModule { name: "bt-decorators", text: include_str!("../modules/bt-decorators.esl"), rows: none },
     HostModule { name: "bt-nav2", text: include_str!("../modules/bt-nav2.esl"), rows: none },
     HostModule { name: "bt-trees", text: include_str!("../modules/bt-trees.esl"), rows: none },
