@@ -4,6 +4,8 @@
 //! zenoh_peer pong ADDRESS                               answers each message of `ping` by one of `pong`
 //! zenoh_peer ping ADDRESS COUNT                         prints the microseconds of a way there and back
 //! zenoh_peer flood ADDRESS KEY RATE SECONDS FILE        publishes the contents of a file
+//! zenoh_peer count ADDRESS                              prints the messages of `data` until one of `end` comes, and the
+//!                                                       microseconds of the processor for each
 //! zenoh_peer router ADDRESS                             passes on what others publish and ask
 //! ```
 #![allow(clippy::print_stdout, reason = "this is a command")]
@@ -91,6 +93,35 @@ fn flood(address: &str, key: &str, rate: f64, seconds: f64, file: &str) -> Outco
     session.close().wait()
 }
 
+/// Returns the time of the processor that this process has taken, in microseconds, by the ticks of the system.
+fn processor_time() -> Result<f64, Box<dyn Error + Send + Sync>> {
+    let text = std::fs::read_to_string("/proc/self/stat")?;
+    let fields = text.rsplit(") ").next().unwrap_or_default();
+    let ticks = fields.split(' ').skip(11).take(2).map(str::parse::<f64>);
+    Ok(ticks.sum::<Result<f64, _>>()? * 1e4)
+}
+
+fn count(address: &str) -> Outcome {
+    let session = open("router", "listen", address)?;
+    let (done, ended) = channel();
+    let (taken, begun) = (std::sync::Arc::new(AtomicU64::new(0)), std::sync::OnceLock::new());
+    let counted = taken.clone();
+    let take = move |sample: zenoh::sample::Sample| {
+        begun.get_or_init(|| processor_time().unwrap_or_default());
+        if sample.key_expr().as_str() == "end" {
+            _ = done.send(*begun.get_or_init(|| 0.0));
+        } else {
+            counted.fetch_add(1, Ordering::Relaxed);
+        }
+    };
+    let _subscriber = session.declare_subscriber("*").callback(take).wait()?;
+    println!("ready");
+    let begun = ended.recv()?;
+    let taken = taken.load(Ordering::Relaxed);
+    println!("{taken} {}", (processor_time()? - begun) / taken.max(1) as f64);
+    Ok(())
+}
+
 fn router(address: &str) -> Outcome {
     let _session = open("router", "listen", address)?;
     println!("ready");
@@ -107,7 +138,8 @@ fn main() -> Outcome {
         ["flood", address, key, rate, seconds, file] => {
             flood(address, key, rate.parse()?, seconds.parse()?, file)
         }
+        ["count", address] => count(address),
         ["router", address] => router(address),
-        _ => Err("expected pong, ping, flood or router, and what belongs to it".into()),
+        _ => Err("expected pong, ping, flood, count or router, and what belongs to it".into()),
     }
 }
