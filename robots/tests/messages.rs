@@ -357,13 +357,18 @@ fn messages_and_hashes_equal_those_of_rosbags() {
     assert_eq!(hashes, fs::read_to_string(&table).expect("it is there"), "ESL_BLESS=1 writes the table");
 }
 
+/// Returns the number of inputs of a test with noise; `ESL_NOISE` sets another one, for longer runs by hand.
+fn noises(usual: usize) -> usize {
+    std::env::var("ESL_NOISE").ok().and_then(|count| count.parse().ok()).unwrap_or(usual)
+}
+
 /// The checks of the fuzz target, with mutated definitions and payloads.
 #[test]
 fn mutated_definitions_and_payloads_are_read_or_refused() {
     let types = Types::bundled();
     let names = types.names();
     let mut random = Random(0x5851_f42d_4c95_7f2d);
-    for round in 0..20_000 {
+    for round in 0..noises(20_000) {
         let name = &names[random.below(names.len())];
         let mut bytes = types.text(name).expect("it is bundled").into_bytes();
         bytes.truncate(400);
@@ -377,4 +382,46 @@ fn mutated_definitions_and_payloads_are_read_or_refused() {
         let bytes = if round % 2 == 0 { bytes } else { bytes.split_off(bytes.len() / 2) };
         noise::understand(&types, &bytes);
     }
+}
+
+/// Payloads of messages of all types, of which bytes are changed, left out, repeated or cut off.
+#[test]
+fn mutated_payloads_of_all_types_are_read_or_refused() {
+    let types = Types::bundled();
+    let mut random = Random(0x2545_f491_4f6c_dd1d);
+    let mut payloads = Vec::new();
+    for name in bundled(&types) {
+        let of_type = message_type(&types, &name);
+        for _ in 0..4 {
+            let message = random.message(&of_type, 0);
+            let payload = encode(&of_type, &message).unwrap_or_else(|fault| panic!("{name}: {fault}"));
+            // An input of usual length, so that changes meet lengths and truth values.
+            if payload.len() < 2000 {
+                payloads.push((of_type.clone(), payload));
+            }
+        }
+    }
+    let mut read = 0;
+    for _ in 0..noises(20_000) {
+        let (of_type, payload) = &payloads[random.below(payloads.len())];
+        let mut bytes = payload.to_vec();
+        for _ in 0..random.below(6) {
+            let place = random.below(bytes.len());
+            match random.below(5) {
+                0 => bytes[place] = [0, 1, 2, 4, 0x7f, 0x80, 0xff][random.below(7)],
+                1 => bytes[place] ^= 1 << random.below(8),
+                2 => _ = bytes.drain(place..(place + random.below(9)).min(bytes.len())),
+                3 => {
+                    let part = bytes[place..(place + random.below(9)).min(bytes.len())].to_vec();
+                    bytes.splice(place..place, part);
+                }
+                _ => bytes.truncate(place),
+            }
+            if bytes.is_empty() {
+                break;
+            }
+        }
+        read += usize::from(noise::pass(of_type, &bytes));
+    }
+    assert!(read > 0, "none is read");
 }

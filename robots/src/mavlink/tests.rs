@@ -178,8 +178,8 @@ impl Numbers {
 #[test]
 fn any_bytes_are_taken_and_every_message_is_the_same_when_written_again() {
     let known: Vec<u32> = (0..70_000).filter(|&number| Dialect::get().message(number).is_some()).collect();
-    // ESL_FRAMES is for longer runs by hand.
-    let count = std::env::var("ESL_FRAMES").ok().and_then(|count| count.parse().ok()).unwrap_or(5_000);
+    // ESL_NOISE is for longer runs by hand.
+    let count = std::env::var("ESL_NOISE").ok().and_then(|count| count.parse().ok()).unwrap_or(5_000);
     let mut numbers = Numbers(0x9e37_79b9_7f4a_7c15);
     let (mut frames, mut bytes) = (0, Vec::new());
     for _ in 0..count {

@@ -183,8 +183,8 @@ fn no_bytes_harm_a_reader() {
         state ^= state << 17;
         (state % below as u64) as usize
     };
-    // More rounds are for runs by hand.
-    let rounds = std::env::var("ESL_ROUNDS").ok().and_then(|text| text.parse().ok()).unwrap_or(1500);
+    // ESL_NOISE is for longer runs by hand.
+    let rounds = std::env::var("ESL_NOISE").ok().and_then(|text| text.parse().ok()).unwrap_or(1500);
     for round in 0..rounds {
         let mut bytes = files[round % files.len()].clone();
         for _ in 0..=random(6) {

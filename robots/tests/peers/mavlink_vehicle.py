@@ -1,19 +1,23 @@
-"""A vehicle by pymavlink, for tests: python mavlink_vehicle.py PORT [LOSS SEED]
+"""A vehicle by pymavlink, for tests: python mavlink_vehicle.py PORT|PATH [LOSS SEED]
 
-It prints what it gets. With LOSS, so many of the messages of each direction are lost, as many come twice, and as many
+It prints what it gets. A PATH becomes the near end of a serial line, at whose far end the vehicle is; it needs the package
+pyserial. With LOSS, so many of the messages of each direction are lost, as many come twice, and as many
 come later than the next one.
 """
 
 import os
 import random
+import select
 import sys
+import threading
 import time
+import tty
 
 os.environ["MAVLINK20"] = "1"
 from pymavlink import mavutil
 
 MAV = mavutil.mavlink
-port, loss = int(sys.argv[1]), float(sys.argv[2]) if len(sys.argv) > 2 else 0.0
+place, loss = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 0.0
 chance = random.Random(int(sys.argv[3]) if len(sys.argv) > 3 else 0)
 
 
@@ -33,7 +37,50 @@ class Lossy:
         return [message] + ([message] if chance.random() < loss else []) + due
 
 
-link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=1, source_component=1, dialect="ardupilotmega")
+class Line:
+    """A serial line: two terminals, and a thread that copies from one to the other."""
+
+    def __init__(self, path):
+        self.path = path
+        self.far, self.far_end = self.terminal()
+        self.is_pulled = False
+        self.plug()
+        threading.Thread(target=self.copy, daemon=True).start()
+
+    def terminal(self):
+        near, end = os.openpty()
+        tty.setraw(end)
+        os.set_blocking(near, False)
+        return near, end
+
+    def plug(self):
+        self.near, self.near_end = self.terminal()
+        os.symlink(os.ttyname(self.near_end), self.path + ".new")
+        os.replace(self.path + ".new", self.path)
+
+    def copy(self):
+        while True:
+            if self.is_pulled:
+                os.close(self.near_end)
+                os.close(self.near)
+                time.sleep(1.5)
+                self.plug()
+                self.is_pulled = False
+            ready, _, _ = select.select([self.near, self.far], [], [], 0.05)
+            for end in ready:
+                try:
+                    os.write(self.far if end == self.near else self.near, os.read(end, 4096))
+                except OSError:
+                    # Nobody reads it.
+                    pass
+
+
+source = {"source_system": 1, "source_component": 1, "dialect": "ardupilotmega"}
+if place.isdigit():
+    link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{place}", **source)
+else:
+    line = Line(place)
+    link = mavutil.mavlink_connection(os.ttyname(line.far_end), baud=57600, **source)
 there, here = Lossy(), Lossy()
 socket_write = link.write
 
@@ -87,6 +134,9 @@ def take_command(message):
             return None
     elif command == MAV.MAV_CMD_USER_2:
         return None
+    elif command == MAV.MAV_CMD_USER_4:
+        # The line is pulled out, and plugged in again.
+        threading.Timer(0.3, lambda: setattr(line, "is_pulled", True)).start()
     elif command == MAV.MAV_CMD_PREFLIGHT_CALIBRATION:
         state["calibrating"] = (time.monotonic(), message)
         return acknowledge(message, MAV.MAV_RESULT_IN_PROGRESS, 0)

@@ -7,6 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
+use esl_conformance::folder::Folder;
 use esl_conformance::process;
 
 use crate::examples::{PATIENCE, example, free_port};
@@ -102,7 +103,10 @@ impl Drop for Run {
 
 #[test]
 fn a_simulated_arm_in_another_process_clears_its_table() {
-    let Some(script) = script() else { return };
+    let Some(mut script) = script() else { return };
+    let folder = Folder::new("manipulator-recorded");
+    let [recording, file] = ["run.eslj", "run.mcap"].map(|name| folder.join(name));
+    script.env("EXECUTIVE_OPTIONS", format!("--record {recording} --mcap {file}"));
     let mut run = Run::start(script, "2");
     run.wait_for("blocks are in the tray, the battery was charged");
     assert!(run.has_seen("4 of 4 blocks are in the tray"), "{:#?}", run.seen);
@@ -112,6 +116,41 @@ fn a_simulated_arm_in_another_process_clears_its_table() {
         assert!(run.has_seen(text), "{text}: {:#?}", run.seen);
     }
     assert!(run.child.wait().is_ok_and(|status| status.success()));
+    let replay = process::run(&mut eslvm(&["replay", &recording]), "");
+    assert_eq!(replay.status, Some(0), "{}", replay.errors);
+    let said = replay.output.lines().filter(|line| !run.has_seen(line)).collect::<Vec<_>>();
+    assert_eq!(said, Vec::<&str>::new(), "the replay says what the run did not say");
+    assert!(replay.output.contains("4 of 4 blocks are in the tray"), "{}", replay.output);
+    topics_of_a_run_are_a_world(&folder);
+}
+
+/// The file of the run is a world, in which each message of its topics comes again.
+fn topics_of_a_run_are_a_world(folder: &Folder) {
+    let text = r#"(require :ros)
+(require :mcap)
+(defvar *counts* (make-hash-table :test 'equal))
+(defun count-messages (node topic type)
+  (let ((messages (ros:subscribe node topic type :qos '(:depth 1000))))
+    (spawn (:daemon t)
+      (loop
+        (wait-for-event messages)
+        (incf (gethash topic *counts* 0))))))
+(with-world ((:bag "run.mcap" :topics ("/joint_states" "/battery")))
+  (ros:with-node (node "reader")
+    (count-messages node "/joint_states" "sensor_msgs/msg/JointState")
+    (count-messages node "/battery" "sensor_msgs/msg/BatteryState")
+    (sleep 1000)))
+(mcap:with-file (file "run.mcap")
+  (dolist (channel (mcap:channels file))
+    (let ((count (gethash (getf channel :topic) *counts*)))
+      (when count
+        (print (list (getf channel :topic) (> count 20) (- count (getf channel :count))))))))"#;
+    folder.file("bag.esl", text);
+    let mut command = eslvm(&["run", "--clock", "virtual", "--allow-read=.", "bag.esl"]);
+    let done = process::run(command.current_dir(folder.path()), "");
+    let mut lines: Vec<&str> = done.output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    lines.sort_unstable();
+    assert_eq!(lines, [r#"("/battery" T 0)"#, r#"("/joint_states" T 0)"#], "{}", done.errors);
 }
 
 #[test]

@@ -223,6 +223,41 @@ fn a_station_of_pymavlink_flies_a_vehicle_in_esl() {
     }
 }
 
+#[test]
+fn a_vehicle_at_a_serial_line_is_commanded_also_after_the_line_was_pulled_out() {
+    let Some(python) =
+        venv::python("mavlink-serial", &[PACKAGE, "pyserial==3.5"], "import pymavlink, serial")
+    else {
+        return;
+    };
+    let text = format!(
+        "{HEAD}(mavlink:with-link (v (format nil \"serial:~a:57600\" (first (command-line-arguments)))
+                    :lost-after 1 :retry-after 0.5)
+  (print (mavlink:wait-for-vehicle v :timeout 20))
+  (mavlink:arm v)
+  (print (mavlink:armed v))
+  (tried (mavlink:command v :nav-takeoff :altitude 12))
+  (mavlink:upload-mission v (points 25))
+  (print (length (mavlink:download-mission v)))
+  (print (hash-table-count (mavlink:parameters v)))
+  (tried (mavlink:set-parameter v \"RTL_ALT\" 1700))
+  (mavlink:command v :user-4)
+  (wait-until (not (mavlink:connected v)) :timeout 20)
+  (print :lost)
+  (wait-until (mavlink:connected v) :timeout 20)
+  (tried (mavlink:parameter v \"RTL_ALT\")))"
+    );
+    let folder = Folder::with("mavlink-serial", &[("main.esl", &text)]);
+    let line = folder.join("line");
+    let vehicle = start_peer(&python, "mavlink_vehicle.py", &[&line]);
+    let run = ["run", &format!("--allow-serial={line}"), "main.esl", &line];
+    let done = process::run(eslvm(&run).current_dir(folder.path()), "");
+    let lines: Vec<&str> = done.output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    assert_eq!(lines, ["(1 1)", "T :ACCEPTED", "25", "41 1700", ":LOST 1700"], "{}", done.errors);
+    // The home of the vehicle is an item there.
+    assert_eq!(vehicle.rest()[..2], ["takeoff 12.0 0.0 0", "mission 26"]);
+}
+
 /// Returns a frame of a heartbeat of MAVLink 2 by this system.
 fn heartbeat(system: u8, sequence: u8) -> Vec<u8> {
     let mut frame = vec![0xfd, 9, 0, 0, sequence, system, 1, 0, 0, 0, 4, 0, 0, 0, 2, 3, 0x81, 4, 3];

@@ -371,3 +371,55 @@ fn clients_that_break_the_protocol_are_told_so() {
     }
     assert!(server.is_running());
 }
+
+/// Frames of all kinds, of which bytes are changed, left out or cut off, end their connection at most.
+/// `ESL_NOISE` sets another number of frames, for longer runs by hand.
+#[test]
+fn noise_ends_its_connection_and_nothing_else() {
+    let folder = Folder::new("ws-noise");
+    let routes = "(:ws \"/echo\" (c :largest 5000) (ws:do-messages (m c) (ws:send c m)))";
+    let (mut server, port) = start_server(&folder, routes, &[]);
+    let mut state = 0x2545_f491_4f6c_dd1d_u64;
+    let mut random = |below: usize| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state % below as u64) as usize
+    };
+    let count = std::env::var("ESL_NOISE").ok().and_then(|count| count.parse().ok()).unwrap_or(20_000);
+    let mut frames = 0;
+    while frames < count {
+        let mut bytes = Vec::new();
+        let number = 1 + random(60);
+        for _ in 0..number {
+            let first = [0x81, 0x82, 0x01, 0x02, 0x00, 0x80, 0x89, 0x8a, 0x81, 0x82, 0x88, 0xc1][random(12)];
+            // Most close frames end the others' connection.
+            let first = if first == 0x88 && random(8) > 0 { 0x89 } else { first };
+            let payload: Vec<u8> = (0..random(40)).map(|_| b"abc{}\xc3\xbc\xff"[random(8)]).collect();
+            bytes.extend(frame(first, &payload));
+        }
+        for _ in 0..random(5) {
+            let place = random(bytes.len());
+            bytes[place] = random(256) as u8;
+        }
+        bytes.truncate(bytes.len() - random(2) * random(bytes.len() / 2));
+        frames += number;
+        let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+        drop(stream.write_all(&[HANDSHAKE.as_bytes(), &bytes].concat()));
+        if random(4) == 0 {
+            drop(stream.shutdown(Shutdown::Write));
+            stream.set_read_timeout(Some(Duration::from_secs(20))).expect("it is a time");
+            drop(stream.read_to_end(&mut Vec::new()));
+        }
+    }
+    let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+    stream.set_read_timeout(Some(Duration::from_secs(20))).expect("it is a time");
+    stream.write_all(&[HANDSHAKE.as_bytes(), &frame(0x81, b"hi")].concat()).expect("it is sent");
+    let mut answer = Vec::new();
+    while !answer.ends_with(&[0x81, 2, b'h', b'i']) {
+        let mut byte = [0];
+        stream.read_exact(&mut byte).expect("the message comes back");
+        answer.extend(byte);
+    }
+    assert!(server.is_running());
+}

@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use esl_conformance::folder::Folder;
 
+use crate::lines::make_certificates;
 use crate::venv;
 use crate::ws::{run, start_server};
 
@@ -192,6 +193,57 @@ fn a_server_talks_to_websockets() {
     ];
     assert_eq!(client.rest(), expected);
     drop(server);
+}
+
+#[test]
+fn connections_over_tls_need_a_server_that_proves_who_it_is() {
+    let Some(python) = python() else { return };
+    let folder = Folder::new("wss");
+    if !make_certificates(&folder) {
+        crate::say_left_out("it needs `openssl`");
+        return;
+    }
+    let [certificate, key, authority] = ["server.pem", "server.key", "ca.pem"].map(|name| folder.join(name));
+    let mut serve = Command::new(&python);
+    let server = Peer::start(serve.arg(script("websocket.py")).args(["serve", &certificate, &key]));
+    let port = server.line();
+    let text = format!(
+        "(defun talk (host &rest options)
+  (flet ((call (c)
+           (dolist (m (list \"grüß dich\" (vector 0 255) (make-string 300000 :initial-element #\\x)))
+             (ws:send c m)
+             (unless (equalp (ws:receive c) m)
+               (return-from talk :changed)))
+           :same))
+    (apply #'ws::call-with-connection #'call (format nil \"wss://~a:{port}/echo\" host) options)))
+(print (talk \"localhost\" :ca-file \"{authority}\"))
+(print (talk \"127.0.0.1\" :ca-file \"{authority}\"))
+(cause (talk \"localhost\"))
+(cause (ws:with-connection (c \"wss://localhost:{port}/echo\" :ca-file \"{key}\") c))
+(cause (ws:with-connection (c \"ws://localhost:{port}/echo\") c))"
+    );
+    let (lines, errors) = run(
+        "wss-client",
+        &text,
+        &["--allow-net=localhost", &format!("--allow-read={}", folder.path().display())],
+    );
+    let causes: Vec<&str> = lines.iter().map(|line| line.split(' ').next().unwrap_or_default()).collect();
+    let expected = [":SAME", ":SAME", "(:TLS-ERROR", "(:TLS-ERROR", "(:PROTOCOL-ERROR"];
+    assert_eq!(causes, expected, "{lines:#?} {errors}");
+
+    let started = "(lambda (port) (format t \"~d~%\" port) (finish-output))";
+    let routes = "(:ws \"/echo\" (c) (ws:do-messages (m c) (ws:send c m)))";
+    let text = format!(
+        "(require :ws) (require :http)
+(http:with-server (0 :started {started} :certificate \"server.pem\" :key \"server.key\") {routes})"
+    );
+    folder.file("server.esl", text);
+    let mut command = crate::eslvm(&["run", "--allow-net=127.0.0.1", "--allow-read=.", "server.esl"]);
+    let server = Peer::start(command.current_dir(folder.path()));
+    let url = format!("wss://localhost:{}", server.line());
+    let mut talk = Command::new(python);
+    let client = Peer::start(talk.arg(script("websocket.py")).args(["secured", &url, &authority]));
+    assert_eq!(client.rest(), ["True", "True", "CERTIFICATE_VERIFY_FAILED"]);
 }
 
 /// Each frame that a client cannot take is a failure at the call, with its reason.

@@ -1,7 +1,8 @@
-"""Peers by the package `websockets`: `serve` is a server, which prints its port; `talk URL` is a client of an echo,
-which prints what it has found."""
+"""Peers by the package `websockets`: `serve [CERTIFICATE KEY]` is a server, which prints its port; `talk URL` is a client
+of an echo, which prints what it has found; `secured URL AUTHORITY` is one by TLS."""
 
 import asyncio
+import ssl
 import sys
 
 import websockets
@@ -47,6 +48,9 @@ async def answer(connection):
 
 async def run_server():
     options = {"subprotocols": ["v2", "v1"], "select_subprotocol": lambda _, offered: offered[0] if offered else None}
+    if len(sys.argv) > 2:
+        options["ssl"] = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        options["ssl"].load_cert_chain(sys.argv[2], sys.argv[3])
     async with serve(answer, "127.0.0.1", 0, **options) as server:
         print(server.sockets[0].getsockname()[1], flush=True)
         await asyncio.get_running_loop().create_future()
@@ -90,7 +94,21 @@ async def talk(url):
         print("refused", refused.response.status_code)
 
 
+async def talk_secured(url, authority):
+    async with connect(url + "/echo", ssl=ssl.create_default_context(cafile=authority)) as connection:
+        for message in ["grüß dich", bytes(300_000)]:
+            await connection.send(message)
+            print(await connection.recv() == message)
+    try:
+        async with connect(url + "/echo", ssl=ssl.create_default_context()):
+            pass
+    except ssl.SSLCertVerificationError as refused:
+        print(refused.reason)
+
+
 if sys.argv[1] == "serve":
     asyncio.run(run_server())
+elif sys.argv[1] == "secured":
+    asyncio.run(talk_secured(*sys.argv[2:4]))
 else:
     asyncio.run(talk(sys.argv[2]))
