@@ -229,6 +229,31 @@ pub fn definitions(rows: &HostRows) -> Datum {
     rows.iter().map(|each| row(each).into_datum()).collect::<Vec<_>>().into_datum()
 }
 
+/// Returns the faults of the rows of modules, for a test of the crate that has them: rows that no text of
+/// `modules` calls, rows without a sentence as their docstring, and texts that define the functions of rows
+/// although there are none, or the other way round.
+pub fn unused_functions(modules: &[HostModule]) -> Vec<String> {
+    let texts: Vec<String> = modules.iter().map(|module| module.text.to_lowercase()).collect();
+    let mut faults = Vec::new();
+    for (HostModule { name, rows, .. }, text) in modules.iter().zip(&texts) {
+        let rows = rows(&Inbox::new());
+        let defines = text.contains(&format!("(esl::%define-host-functions \"{name}\")"));
+        if defines != rows.iter().next().is_some() {
+            faults.push(format!("{name} has rows without their definitions, or definitions without rows"));
+        }
+        for row in rows.iter() {
+            let call = row.name.to_lowercase();
+            if !texts.iter().any(|text| text.contains(&call)) {
+                faults.push(format!("no module calls {}", row.name));
+            }
+            if !row.documentation.ends_with('.') {
+                faults.push(format!("the docstring of {} is not a sentence", row.name));
+            }
+        }
+    }
+    faults
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -62,7 +62,7 @@ pub use argument::{ArgumentList, ArgumentReader, FromArgument, FromCall, Payload
 pub use external_clock::ClockStep;
 pub use function::{
     BeginFuture, Completion, DataFunction, Handler, HostFunction, HostModule, HostRow, HostRows, Need,
-    OperationFuture, definitions,
+    OperationFuture, definitions, unused_functions,
 };
 pub use host::{
     Awaited, FileAnswer, FileRequest, Host, HostError, HostState, Input, Output, RunCheck, VIRTUAL_BEGINNING,

@@ -1,11 +1,11 @@
 //! The library of ESL programs over the operating system.
 //!
-//! Whatever the system may delay is an operation, done on one event loop in its own thread: only the task
+//! Work that the system may delay is an operation, done on one event loop in its own thread: only the task
 //! that has asked for it waits. The operations are the small part of a module that is in Rust; the rest is in
 //! ESL, in `modules/`.
 //!
-//! Guarantees: each operation names the right that it needs, which is asked for before it begins. What a
-//! peer, a child or the system does wrong is a failure at the call.
+//! Guarantees: each operation names the right that it needs, which is asked for before it begins. An error of
+//! a peer, a child or the system is a failure at the call.
 //!
 //! ```
 //! use esl_host::RealHost;
@@ -46,6 +46,7 @@ use esl_vm::vm::Vm;
 pub use event_loop::{NoEventLoop, spawn};
 pub use modules::{add_modules, feature_of_module, module, module_names};
 pub use operation::{Cancelled, ready_soon, spawned, to_its_end};
+pub use socket::socket_failure;
 #[cfg(feature = "tls")]
 pub use tls::{PemFault, TlsError, TlsIdentity, begin_tls};
 

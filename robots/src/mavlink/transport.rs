@@ -4,12 +4,13 @@
 //! that get longer.
 
 use std::future::Future;
-use std::io::{Error, ErrorKind};
+use std::io::Error;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use esl_host::HostFailure;
+use esl_world::socket_failure;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream, UdpSocket};
 use tokio::sync::mpsc;
@@ -25,19 +26,6 @@ const MOST_CONNECTIONS: usize = 8;
 const CHUNK: usize = 1 << 16;
 /// Shortest and longest pause before a connection is made again.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
-
-fn failure(error: &Error) -> HostFailure {
-    let cause = match error.kind() {
-        ErrorKind::ConnectionRefused => "CONNECTION-REFUSED",
-        ErrorKind::ConnectionReset | ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe => {
-            "CONNECTION-LOST"
-        }
-        ErrorKind::AddrInUse => "ADDRESS-IN-USE",
-        ErrorKind::TimedOut => "TIMEOUT",
-        _ => "SOCKET-ERROR",
-    };
-    HostFailure::new(cause, error)
-}
 
 /// Runs a task until it is over or the link is closed.
 fn run(link: &LinkCore, task: impl Future<Output = ()> + Send + 'static) -> Result<(), HostFailure> {
@@ -57,7 +45,7 @@ pub(super) async fn open(link: &Arc<LinkCore>, kind: &str, address: &str) -> Res
     match kind {
         "udpin" => datagrams(link, address, None).await,
         "udpout" => {
-            let mut found = tokio::net::lookup_host(address).await.map_err(|error| failure(&error))?;
+            let mut found = tokio::net::lookup_host(address).await.map_err(|error| socket_failure(&error))?;
             let unknown =
                 || HostFailure::new("SOCKET-ERROR", format!("the host of `{address}` has no address"));
             let remote = found.next().ok_or_else(unknown)?;
@@ -65,7 +53,7 @@ pub(super) async fn open(link: &Arc<LinkCore>, kind: &str, address: &str) -> Res
             datagrams(link, any, Some(remote)).await
         }
         "tcpin" => {
-            let listener = TcpListener::bind(address).await.map_err(|error| failure(&error))?;
+            let listener = TcpListener::bind(address).await.map_err(|error| socket_failure(&error))?;
             let port = listener.local_addr().map_or(0, |address| address.port());
             run(link, accept(link.clone(), listener))?;
             Ok(port)
@@ -76,7 +64,7 @@ pub(super) async fn open(link: &Arc<LinkCore>, kind: &str, address: &str) -> Res
                 let address = address.clone();
                 move || TcpStream::connect(address.clone())
             };
-            let stream = connect().await.map_err(|error| failure(&error))?;
+            let stream = connect().await.map_err(|error| socket_failure(&error))?;
             let port = stream.local_addr().map_or(0, |address| address.port());
             run(link, reconnect(link.clone(), format!("tcp {address}"), stream, connect))?;
             Ok(port)
@@ -104,7 +92,7 @@ async fn datagrams(
     address: &str,
     remote: Option<SocketAddr>,
 ) -> Result<u16, HostFailure> {
-    let socket = Arc::new(UdpSocket::bind(address).await.map_err(|error| failure(&error))?);
+    let socket = Arc::new(UdpSocket::bind(address).await.map_err(|error| socket_failure(&error))?);
     let port = socket.local_addr().map_or(0, |address| address.port());
     let (packets, waiting) = mpsc::channel(MOST_WAITING);
     link.add_port(Some(remote), packets);

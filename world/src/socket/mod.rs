@@ -87,8 +87,8 @@ impl From<SocketFault> for HostFailure {
     }
 }
 
-/// Returns the failure for an error of the system.
-pub(crate) fn socket_failure(error: &Error) -> HostFailure {
+/// Returns the failure of a socket for an error of the system.
+pub fn socket_failure(error: &Error) -> HostFailure {
     let cause = match error.kind() {
         ErrorKind::ConnectionRefused => "CONNECTION-REFUSED",
         ErrorKind::ConnectionReset | ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe => {
@@ -279,7 +279,7 @@ fn add_connections(rows: &mut HostRows) {
         ready_soon,
         "%SOCKET-WRITE",
         ["socket", "contents"],
-        "Writes what is kept, and CONTENTS, a text or bytes.",
+        "Writes the unsent bytes, and CONTENTS, a text or bytes.",
         connection::write,
     );
 }
@@ -290,7 +290,7 @@ fn add_listeners(rows: &mut HostRows) {
         ready_soon,
         "%SOCKET-LISTEN",
         ["socket", "address", "certificate", "key"],
-        "Has SOCKET listen at ADDRESS; by TLS, if there are files of CERTIFICATE and KEY.",
+        "Makes SOCKET listen at ADDRESS; by TLS, if there are files of CERTIFICATE and KEY.",
         listener::listen,
     )
     .needs(Right::Net, "address")
@@ -301,7 +301,7 @@ fn add_listeners(rows: &mut HostRows) {
         ready_soon,
         "%SOCKET-LISTEN-UNIX",
         ["socket", "path"],
-        "Has SOCKET listen at the Unix socket PATH.",
+        "Makes SOCKET listen at the Unix socket PATH.",
         listener::listen_unix,
     )
     .needs(Right::Read, "path")
