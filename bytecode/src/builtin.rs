@@ -51,10 +51,10 @@ pub enum Shares {
     Properties,
     /// It changes the value of a special variable.
     Variables,
-    /// It reads the clock, so that what follows depends on the time.
+    /// It reads the clock, so that the further course depends on the time.
     Clock,
     /// It changes something that explorations leave out: a definition, a package, a stream, a file, random
-    /// numbers, or what belongs to the running task.
+    /// numbers, or state of the running task.
     Own,
 }
 
@@ -335,35 +335,36 @@ macro_rules! for_each_builtin {
             /// The product; 1 of no numbers.
             Multiply = number::multiply, cl "*" ("&rest numbers") shares nothing -> one slowly "%SLOW-*";
             /// The first number divided by the others; the reciprocal of a single one. Exact for integers and
-            /// ratios.
+            /// ratios. Fails with `:division-by-zero`.
             Divide = number::divide, cl "/" ("number &rest numbers") shares nothing -> one slowly "%SLOW-/";
             /// `number` plus one.
             Increment = number::increment, cl "1+" ("number") shares nothing -> one slowly "%SLOW-1+";
             /// `number` less one.
             Decrement = number::decrement, cl "1-" ("number") shares nothing -> one slowly "%SLOW-1-";
-            /// Quotient rounded towards minus infinity, and remainder.
+            /// Quotient rounded towards minus infinity, and remainder. Fails with `:division-by-zero`.
             Floor = number::floor, cl "FLOOR" ("number &optional divisor")
                 shares nothing slowly "%SLOW-FLOOR";
-            /// Quotient rounded towards plus infinity, and remainder.
+            /// Quotient rounded towards plus infinity, and remainder. Fails with `:division-by-zero`.
             Ceiling = number::ceiling, cl "CEILING" ("number &optional divisor")
                 shares nothing slowly "%SLOW-CEILING";
-            /// Quotient rounded towards zero, and remainder.
+            /// Quotient rounded towards zero, and remainder. Fails with `:division-by-zero`.
             Truncate = number::truncate, cl "TRUNCATE" ("number &optional divisor")
                 shares nothing slowly "%SLOW-TRUNCATE";
-            /// Quotient rounded to the nearest integer, halves to the even one, and remainder.
+            /// Quotient rounded to the nearest integer, halves to the even one, and remainder. Fails with
+            /// `:division-by-zero`.
             Round = number::round, cl "ROUND" ("number &optional divisor")
                 shares nothing slowly "%SLOW-ROUND";
             /// The remainder of `floor`.
             Mod = number::modulo, cl "MOD" ("number divisor") shares nothing -> one slowly "%SLOW-MOD";
             /// The remainder of `truncate`.
             Rem = number::remainder, cl "REM" ("number divisor") shares nothing -> one slowly "%SLOW-REM";
-            /// The numbers' bitwise and; -1 of none.
+            /// Bitwise "and" of the integers; -1 of none.
             LogAnd = integer::logand, cl "LOGAND" ("&rest integers")
                 shares nothing -> one slowly "%SLOW-LOGAND";
-            /// The numbers' bitwise or; 0 of none.
+            /// Bitwise "or" of the integers; 0 of none.
             LogIor = integer::logior, cl "LOGIOR" ("&rest integers")
                 shares nothing -> one slowly "%SLOW-LOGIOR";
-            /// The numbers' bitwise exclusive or; 0 of none.
+            /// Bitwise "exclusive or" of the integers; 0 of none.
             LogXor = integer::logxor, cl "LOGXOR" ("&rest integers")
                 shares nothing -> one slowly "%SLOW-LOGXOR";
             /// `integer` shifted left by `count` bits, right if that is negative.
@@ -507,9 +508,9 @@ macro_rules! for_each_builtin {
             Lcm = integer::lcm, cl "LCM" ("&rest integers") shares nothing slowly "%SLOW-LCM";
             /// The greatest integer whose square is not above `integer`.
             Isqrt = integer::isqrt, cl "ISQRT" ("integer") shares nothing slowly "%SLOW-ISQRT";
-            /// The numbers' bitwise equivalence; -1 of none.
+            /// Bitwise equivalence of the integers; -1 of none.
             LogEqv = integer::logeqv, cl "LOGEQV" ("&rest integers") shares nothing slowly "%SLOW-LOGEQV";
-            /// All bits turned over.
+            /// The integer with all bits inverted.
             LogNot = integer::lognot, cl "LOGNOT" ("integer") shares nothing;
             /// Bits of `right` that are not in `left`.
             LogAndC1 = integer::logandc1, cl "LOGANDC1" ("left right") shares nothing;
@@ -596,20 +597,20 @@ macro_rules! for_each_builtin {
             /// Whether the codes never increase.
             CharGreaterEqual = character::char_greater_equal, cl "CHAR>=" ("character &rest characters")
                 shares nothing;
-            /// As `char=`, whatever the case.
+            /// As `char=`, ignoring case.
             CharEqual = character::char_equal, cl "CHAR-EQUAL" ("character &rest characters") shares nothing;
-            /// As `char/=`, whatever the case.
+            /// As `char/=`, ignoring case.
             CharNotEqual = character::char_not_equal, cl "CHAR-NOT-EQUAL" ("character &rest characters")
                 shares nothing;
-            /// As `char<`, whatever the case.
+            /// As `char<`, ignoring case.
             CharLessp = character::char_lessp, cl "CHAR-LESSP" ("character &rest characters") shares nothing;
-            /// As `char>`, whatever the case.
+            /// As `char>`, ignoring case.
             CharGreaterp = character::char_greaterp, cl "CHAR-GREATERP" ("character &rest characters")
                 shares nothing;
-            /// As `char<=`, whatever the case.
+            /// As `char<=`, ignoring case.
             CharNotGreaterp = character::char_not_greaterp, cl "CHAR-NOT-GREATERP"
                 ("character &rest characters") shares nothing;
-            /// As `char>=`, whatever the case.
+            /// As `char>=`, ignoring case.
             CharNotLessp = character::char_not_lessp, cl "CHAR-NOT-LESSP" ("character &rest characters")
                 shares nothing;
 
@@ -628,11 +629,11 @@ macro_rules! for_each_builtin {
             /// Whether two parts of strings are the same.
             StringEqualExactly = string::string_equal_exactly, internal "%STRING="
                 ("left right &optional start1 end1 start2 end2") shares nothing slowly "%SLOW-STRING=";
-            /// Whether two parts of strings are the same, whatever the case.
+            /// Whether two parts of strings are the same, ignoring case.
             StringEqualLoosely = string::string_equal_loosely, internal "%STRING-EQUAL"
                 ("left right &optional start1 end1 start2 end2") shares nothing slowly "%SLOW-STRING-EQUAL";
             /// -1, 0 or 1, as the first of two parts of strings is before, the same as, or behind the other,
-            /// and the index in the first where they begin to differ; with `fold`, whatever the case.
+            /// and the index in the first where they begin to differ; with `fold`, ignoring case.
             StringCompare = string::string_compare, internal "%STRING-COMPARE"
                 ("left right start1 end1 start2 end2 fold") shares nothing slowly "%SLOW-STRING-COMPARE";
             /// A fresh string, the part in upper case.
@@ -870,7 +871,7 @@ macro_rules! for_each_builtin {
             // ---- sequences
             /// Number of elements.
             Length = sequence::length, cl "LENGTH" ("sequence") shares nothing slowly "%SLOW-LENGTH";
-            /// Element `index` of a list or vector.
+            /// Element `index` of a list or vector. Fails with `:type-error` if there is none.
             Elt = sequence::elt, cl "ELT" ("sequence index") shares nothing slowly "%SLOW-ELT";
             /// Makes `value` element `index` of a list or vector, and returns `value`.
             SetElt = sequence::set_elt, internal "%SET-ELT" ("sequence index value")
@@ -882,7 +883,7 @@ macro_rules! for_each_builtin {
             CopySeq = sequence::copy_seq, cl "COPY-SEQ" ("sequence") shares nothing slowly "%SLOW-COPY-SEQ";
             /// A fresh sequence of the elements in reverse order.
             Reverse = sequence::reverse, cl "REVERSE" ("sequence") shares nothing slowly "%SLOW-REVERSE";
-            /// The sequence turned round in place.
+            /// The sequence, reversed in place.
             NReverse = sequence::nreverse, cl "NREVERSE" ("sequence") shares pairs slowly "%SLOW-NREVERSE";
             /// Makes `item` every element of a part of a vector, and returns the vector.
             Fill = sequence::fill, internal "%FILL" ("vector item start end")
@@ -1011,9 +1012,9 @@ macro_rules! for_each_builtin {
             AddToValue = table::add_to_value, internal "%ADD-TO-VALUE" ("key table default delta")
                 shares tables
                 slowly "%SLOW-ADD-TO-VALUE";
-            /// Takes `key` out of the table; whether it was there.
+            /// Removes `key` from the table. Returns whether it was there.
             Remhash = table::remhash, cl "REMHASH" ("key table") shares tables slowly "%SLOW-REMHASH";
-            /// Takes everything out of the table, and returns it.
+            /// Removes all entries of the table, and returns it.
             Clrhash = table::clrhash, cl "CLRHASH" ("table") shares tables;
             /// Number of keys.
             HashTableCount = table::hash_table_count, cl "HASH-TABLE-COUNT" ("table") shares nothing;
@@ -1058,10 +1059,10 @@ macro_rules! for_each_builtin {
 
             // ---- failures and the control stack
             /// The innermost handlers below `height`, or of all if that is `NIL`, that no mask hides: index
-            /// of the entry, its kind, and what goes with it: `:functions` and a list of `(type . function)`,
-            /// `:cases` and their types; for a `failure`, its condition or cause, also `:recovery` and the
-            /// table or state of recovery procedures, or `:cleanup`. `NIL` if there are none. A search
-            /// through all entries notifies the observers of the failure.
+            /// of the entry, its kind, and its data: `:functions` and a list of `(type . function)`, `:cases`
+            /// and their types; for a `failure`, its condition or cause, also `:recovery` and the table or
+            /// state of recovery procedures, or `:cleanup`. `NIL` if there are none. A search through all
+            /// entries notifies the observers of the failure.
             NextHandler = failure::next_handler, internal "%NEXT-HANDLER"
                 ("height failure &optional arguments") shares own;
             /// Unwinds to the entry with this index, of the cases of a `handler-case`, and has one of them
@@ -1085,14 +1086,13 @@ macro_rules! for_each_builtin {
             /// The failure that `%UNWIND-TO-CLEANUP` has passed to the innermost running cleanup, or `NIL`.
             CleaningUp = failure::cleaning_up, internal "%CLEANING-UP" ("") shares own;
             /// Returns true if it is reported when the running task fails: unless it belongs to a form, which
-            /// is told of its end, or in a cleanup while it ends.
+            /// learns of its end, or it fails in a cleanup while it ends.
             IsReported = failure::is_reported, internal "%IS-REPORTED" ("") shares own;
             /// Lends the memory that is kept for cleanups to the running task, which ends with a report.
             LendReportMemory = failure::lend_report_memory, internal "%LEND-REPORT-MEMORY" ("") shares own;
-            /// Ends the running task as failed, with this condition: its text in a few words, and for people
-            /// what has happened where, and the line that says that there is no recovery. In a cleanup of a
-            /// task that ends already, or that leaves an expired limit, ends the cleanup, and the report goes
-            /// with that of the task.
+            /// Ends the running task as failed, with this condition: its text in a few words, the report for
+            /// users, and its line about the missing recovery. In a cleanup of a task that ends already, or
+            /// that leaves an expired limit, ends the cleanup, and the report goes with that of the task.
             EndTask = failure::end_task, internal "%END-TASK" ("condition text story ending history full")
                 shares own;
             /// Ends the run with this status, from 0 to 255. The remaining tasks are aborted.
@@ -1177,21 +1177,23 @@ macro_rules! for_each_builtin {
             /// Removes the property `indicator` of `symbol`; whether it had one.
             Remprop = symbol::remprop, cl "REMPROP" ("symbol indicator")
                 shares properties slowly "%SLOW-REMPROP";
-            /// The value of the special variable `symbol`.
+            /// The value of the special variable `symbol`. Fails with `:unbound-variable` if it has none.
             SymbolValue = symbol::symbol_value, cl "SYMBOL-VALUE" ("symbol") shares nothing;
             /// Sets the special variable `symbol`, and returns `value`.
             Set = symbol::set, cl "SET" ("symbol value") shares variables;
             /// Whether the special variable `symbol` has a value.
             Boundp = symbol::boundp, cl "BOUNDP" ("symbol") shares nothing;
-            /// Takes the value of the special variable `symbol` away.
+            /// Removes the value of the special variable `symbol`, and returns `symbol`.
             Makunbound = symbol::makunbound, cl "MAKUNBOUND" ("symbol") shares variables;
             /// Whether `name`, a symbol or `(setf symbol)`, names a global function or macro.
             Fboundp = symbol::fboundp, cl "FBOUNDP" ("name") shares nothing;
-            /// The global function, or macro function, named by `symbol`.
+            /// The global function, or macro function, named by `symbol`. Fails with `:undefined-function` if
+            /// there is none.
             SymbolFunction = symbol::fdefinition, cl "SYMBOL-FUNCTION" ("symbol") shares nothing;
-            /// The global function, or macro function, named by `name`, a symbol or `(setf symbol)`.
+            /// The global function, or macro function, named by `name`, a symbol or `(setf symbol)`. Fails
+            /// with `:undefined-function` if there is none.
             Fdefinition = symbol::fdefinition, cl "FDEFINITION" ("name") shares nothing;
-            /// Takes the function or macro named by `name` away.
+            /// Removes the function or macro named by `name`, and returns `name`.
             Fmakunbound = symbol::fmakunbound, cl "FMAKUNBOUND" ("name") shares own;
             /// The symbol that keeps the function called `name`: itself, or for `(setf symbol)` one of the
             /// same package.
@@ -1252,7 +1254,7 @@ macro_rules! for_each_builtin {
             /// their names.
             ShadowingImport = package::shadowing_import, cl "SHADOWING-IMPORT" ("symbols &optional package")
                 shares own;
-            /// Gives `package` symbols of its own by these names.
+            /// Gives `package` symbols of its own by these names. Returns `T`.
             Shadow = package::shadow, cl "SHADOW" ("names &optional package") shares own;
             /// The symbol that `name` denotes in `package`, made if there is none; and how the package has
             /// it, `NIL` for new.
@@ -1292,7 +1294,7 @@ macro_rules! for_each_builtin {
             ClassSlots = class::class_slots, internal "%CLASS-SLOTS" ("class") shares nothing;
             /// The library's data about a class.
             ClassData = class::class_data, internal "%CLASS-DATA" ("class") shares nothing;
-            /// Makes `data` what the library keeps about a class, and returns it.
+            /// Makes `data` the library's data about a class, and returns it.
             SetClassData = class::set_class_data, internal "%SET-CLASS-DATA" ("class data") shares own;
             /// Whether `class` is `ancestor` or inherits from it.
             SubclassP = class::subclass_p, internal "%SUBCLASS-P" ("class ancestor") shares nothing;
@@ -1328,8 +1330,8 @@ macro_rules! for_each_builtin {
             Instancep = instance::instancep, internal "%INSTANCEP" ("object") shares nothing;
             /// The content of a slot without a value.
             UnboundMarker = instance::unbound_marker, internal "%UNBOUND-MARKER" ("") shares nothing;
-            /// The slot `name` of `instance`. `cache` is a simple vector of the layout that was met last, and
-            /// the slot's index there.
+            /// The slot `name` of `instance`. `cache` is a simple vector of the layout of the last access,
+            /// and the slot's index there.
             CachedSlotValue = instance::slot_value, internal "%SLOT-VALUE" ("instance name cache")
                 shares nothing
                 slowly "%SLOW-SLOT-VALUE";
@@ -1346,7 +1348,7 @@ macro_rules! for_each_builtin {
             // ---- reading and compiling at run time
             /// A handle of the compilation of `form`.
             BeginCompilation = eval::begin_compilation, internal "%BEGIN-COMPILATION" ("form") shares own;
-            /// A handle of the compilation of a whole text, called `name` in what is said about it.
+            /// A handle of the compilation of a whole text, called `name` in messages about it.
             BeginFile = eval::begin_file, internal "%BEGIN-FILE" ("name text") shares own;
             /// The functions that run the top-level forms of a compiled file, in order. With a vector of its
             /// bytes, the file is not read.
@@ -1359,8 +1361,8 @@ macro_rules! for_each_builtin {
             TextRest = eval::text_rest, internal "%TEXT-REST" ("handle") shares nothing;
             /// A handle of the compilation of the next form of a text, `NIL` at its end.
             NextForm = eval::next_form, internal "%NEXT-FORM" ("handle") shares own;
-            /// Tells a compilation what became of its last step, and returns the next one: `:expand` function
-            /// form environment, `:load` functions keep, or `:done` functions diagnostics.
+            /// Passes the outcome of its last step to a compilation, and returns the next one: `:expand`
+            /// function form environment, `:load` functions keep, or `:done` functions diagnostics.
             CompilationStep = eval::compilation_step, internal "%COMPILATION-STEP" ("handle kind outcome")
                 shares own;
             /// Ends a compilation, or lets go of a text; whether there are data left for further calls to
@@ -1381,7 +1383,7 @@ macro_rules! for_each_builtin {
             JsonValue = json::value, internal "%JSON-VALUE"
                 ("string start are-tables is-table-if-empty false null") shares nothing;
             /// Reads a part of a JSON string that has begun: its characters, the index after them, and `NIL`,
-            /// `T` if the string has ended, or a text that says what is wrong at the index.
+            /// `T` if the string has ended, or a text about the fault at the index.
             JsonStringPart = json::string_part, internal "%JSON-STRING-PART" ("string start") shares nothing;
             /// Writes a part of a string to a string stream as JSON does, without the quotes.
             JsonWritePart = json::write_part, internal "%JSON-WRITE-PART" ("string stream start end")
@@ -1404,7 +1406,7 @@ macro_rules! for_each_builtin {
             /// the end with `NIL`. Whether it does.
             SetStringInputPosition = stream::set_string_input_position,
                 internal "%SET-STRING-INPUT-POSITION" ("stream position") shares own;
-            /// A stream that gathers what is written to it.
+            /// A stream that gathers its output in a string.
             MakeStringOutput = stream::make_string_output, internal "%MAKE-STRING-OUTPUT" ("") shares nothing;
             /// The characters that a string stream has gathered since the last call.
             GetOutputStreamString = stream::get_output_stream_string, cl "GET-OUTPUT-STREAM-STRING" ("stream")
@@ -1413,18 +1415,18 @@ macro_rules! for_each_builtin {
             /// How many characters a string stream has gathered since it was last asked for them.
             GatheredLength = stream::gathered_length, internal "%GATHERED-LENGTH" ("stream") shares nothing;
             /// The strings in which a string stream has gathered them, the last first; it begins afresh.
-            /// `NIL` if they are not `length` characters any more. The last string may be longer than what is
-            /// in it.
+            /// `NIL` if they are not `length` characters any more. The last string may be longer than the
+            /// characters in it.
             TakeGathered = stream::take_gathered, internal "%TAKE-GATHERED" ("stream length") shares own;
-            /// Closes a stream; what a channel has gathered is dropped. Whether it was open.
+            /// Closes a stream; the buffered output of a channel is dropped. Whether it was open.
             CloseStream = stream::close, internal "%CLOSE" ("stream") shares own;
             /// The text of a file.
             FileText = stream::file_text, internal "%FILE-TEXT" ("path &optional is-module") shares own;
-            /// Whether there is a file of this name, which is to be read; with `T`, as a module, with
-            /// anything else, to be written.
+            /// Whether there is a file of this name. Checks the right to read it; with `T`, as a module; with
+            /// anything else, the right to write it.
             FileExistsP = stream::file_exists_p, internal "%FILE-EXISTS-P" ("path &optional use")
                 shares nothing;
-            /// The names of what is in a folder; those of folders end in `/`.
+            /// The names of the entries of a folder; those of folders end in `/`.
             ListFolder = file::list_folder, internal "%LIST-FOLDER" ("path") shares nothing;
             /// Gives a file another name.
             RenameFile = file::rename_file, internal "%RENAME-FILE" ("path new-path") shares own;
@@ -1447,13 +1449,14 @@ macro_rules! for_each_builtin {
             /// The data of such a stream; `NIL` for any other object.
             CustomStreamData = stream::custom_stream_data, internal "%CUSTOM-STREAM-DATA" ("stream")
                 shares nothing;
-            /// A stream whose characters come from and go to what `handler` says: to be read if `direction`
-            /// is 1, to be written if it is 2, otherwise both. `file` is the name of the file, or `NIL`.
+            /// A stream whose characters come from and go to the functions of `handler`: for reading if
+            /// `direction` is 1, for writing if it is 2, otherwise for both. `file` is the name of the file,
+            /// or `NIL`.
             MakeChannel = stream::make_channel, internal "%MAKE-CHANNEL" ("handler file direction")
                 shares own;
             /// The handler of a channel; `NIL` for any other object.
             ChannelHandler = stream::channel_handler, internal "%CHANNEL-HANDLER" ("object") shares nothing;
-            /// The string stream that gathers what is written to a channel.
+            /// The string stream that buffers the output to a channel.
             ChannelOutput = stream::channel_output, internal "%CHANNEL-OUTPUT" ("channel") shares nothing;
             /// How many characters a channel has to be read, whether there is a whole line among the first of
             /// them, and whether no more will come.
@@ -1486,7 +1489,8 @@ macro_rules! for_each_builtin {
             /// Characters since the last line end that was written to a stream.
             StreamColumn = stream::stream_column, internal "%STREAM-COLUMN" ("stream")
                 shares nothing slowly "%SLOW-STREAM-COLUMN";
-            /// The next character of a stream. Waits for standard input.
+            /// The next character of a stream. Waits for input. At the end fails with `:end-of-file`, or
+            /// returns `eof-value` if `eof-error-p` is `NIL`.
             ReadChar = stream::read_char, cl "READ-CHAR"
                 ("&optional stream eof-error-p eof-value recursive-p") shares own slowly "%SLOW-READ-CHAR";
             /// The next character of a stream, or `NIL` if it would have to wait.
@@ -1503,7 +1507,8 @@ macro_rules! for_each_builtin {
             /// Puts the character that was read last back into a stream.
             UnreadChar = stream::unread_char, cl "UNREAD-CHAR" ("character &optional stream")
                 shares own slowly "%SLOW-UNREAD-CHAR";
-            /// The next line of a stream, and whether it has no line end. Waits for standard input.
+            /// The next line of a stream, and whether it has no line end. Waits for input. At the end fails
+            /// with `:end-of-file`, or returns `eof-value` if `eof-error-p` is `NIL`.
             ReadLine = stream::read_line, cl "READ-LINE"
                 ("&optional stream eof-error-p eof-value recursive-p") shares own slowly "%SLOW-READ-LINE";
             /// Writes a character to a stream, and returns it.
@@ -1518,10 +1523,10 @@ macro_rules! for_each_builtin {
             /// Ends the line that is being written to a stream, unless it is empty; whether it did.
             FreshLine = stream::fresh_line, cl "FRESH-LINE" ("&optional stream")
                 shares own slowly "%SLOW-FRESH-LINE";
-            /// Writes what a stream has gathered.
+            /// Writes the buffered output of a stream.
             FinishOutput = stream::finish_output, cl "FINISH-OUTPUT" ("&optional stream")
                 shares own slowly "%SLOW-FINISH-OUTPUT";
-            /// Writes what a stream has gathered.
+            /// Writes the buffered output of a stream.
             ForceOutput = stream::finish_output, cl "FORCE-OUTPUT" ("&optional stream")
                 shares own slowly "%SLOW-FORCE-OUTPUT";
 
@@ -1552,9 +1557,9 @@ macro_rules! for_each_builtin {
             /// names it. With `facts`, its answers are the facts that match a pattern.
             OpenQuery = database::open_query, internal "%OPEN-QUERY" ("query bindings facts") shares points;
             /// Works on a query: `T` when all answers are found, `NIL` when there is more to do; or `:test`,
-            /// a function whose value is to be told, and the bindings under which to call it.
+            /// a function whose value the query needs, and the bindings under which to call it.
             QueryStep = database::query_step, internal "%QUERY-STEP" ("query") shares own;
-            /// Tells a query the outcome of the test that it has asked for.
+            /// Passes the outcome of the requested test to a query.
             QueryTell = database::query_tell, internal "%QUERY-TELL" ("query holds") shares own;
             /// The next answers of a query, a list of binding lists; empty when all were given.
             QueryAnswers = database::query_answers, internal "%QUERY-ANSWERS" ("query") shares own;
@@ -1582,8 +1587,8 @@ macro_rules! for_each_builtin {
             // ---- events
             /// A new event. The name is for reports.
             MakeEvent = event::make_event, esl "MAKE-EVENT" ("&optional name") shares nothing;
-            /// Signals an event: all tasks that wait for it go on, in the order in which they began to, and
-            /// get the arguments.
+            /// Signals an event: all tasks that wait for it go on, in the order in which they began to wait,
+            /// and get the arguments. Returns `NIL`.
             Signal = event::signal, esl "SIGNAL" ("event &rest arguments") shares points;
             /// The same as `signal`.
             SignalEvent = event::signal, esl "SIGNAL-EVENT" ("event &rest arguments") shares points;
@@ -1609,15 +1614,15 @@ macro_rules! for_each_builtin {
             WaitForEvent = event::wait_for_events, esl "WAIT-FOR-EVENT" ("events &rest options") shares points
                 slowly "%SLOW-WAIT-FOR-EVENT";
             /// Waits for the next signal of one of `events` and returns its arguments; returns at once if
-            /// `count` is not `NIL` and no longer the sum of their counts. `what` is for reports.
-            Wait = event::wait, internal "%WAIT" ("events count what") shares points;
+            /// `count` is not `NIL` and no longer the sum of their counts. `label` is for reports.
+            Wait = event::wait, internal "%WAIT" ("events count label") shares points;
             /// Signals `event` and begins to wait for its next signal, in one step; returns at once if
-            /// `count` is no longer its count. `what` is for reports.
-            SignalAndWait = event::signal_and_wait, internal "%SIGNAL-AND-WAIT" ("event count what")
+            /// `count` is no longer its count. `label` is for reports.
+            SignalAndWait = event::signal_and_wait, internal "%SIGNAL-AND-WAIT" ("event count label")
                 shares points;
             /// A wait that keeps all signals of `events` until it is closed, and lasts for `seconds` if they
             /// are not `NIL`; `NIL` if `count` is not `NIL` and no longer the sum of their counts.
-            OpenWait = event::open_wait, internal "%OPEN-WAIT" ("events seconds count what") shares points;
+            OpenWait = event::open_wait, internal "%OPEN-WAIT" ("events seconds count label") shares points;
             /// Waits for a signal that a wait has kept: the list of its arguments, or `:timeout`; at the
             /// latest until a time in nanoseconds, if one is given.
             TakeSignal = event::take_signal, internal "%TAKE-SIGNAL" ("wait &optional deadline") shares own;
@@ -1650,36 +1655,36 @@ macro_rules! for_each_builtin {
             /// before.
             SetFluent = coordination::set_fluent, internal "%SET-FLUENT" ("fluent value") shares points
                 slowly "%SLOW-SET-FLUENT";
-            /// A new record of what this task reads, for a watch if one is given.
+            /// A new record of the sources that this task reads, for a watch if one is given.
             NewReads = coordination::new_reads, internal "%NEW-READS" ("&optional watch") shares points;
             /// Notes that a source is read, with the count of its event; whether it was not noted yet.
             NoteSource = coordination::note_read, internal "%NOTE-SOURCE" ("source reads") shares points;
             /// The value of a fluent; it is noted as read if the reads are those of this task.
             NotedValue = coordination::noted_value, internal "%NOTED-VALUE" ("fluent reads") shares points
                 slowly "%SLOW-NOTED-VALUE";
-            /// Waits for the next signal of what a form has read, or of any event if that is nothing or too
-            /// much; not if there was one since it was read. `what` is for reports. A new record of what
-            /// this task reads.
-            WaitForReads = coordination::wait_for_reads, internal "%WAIT-FOR-READS" ("reads what")
+            /// Waits for the next signal of the sources that a form has read, or of any event if there are
+            /// none or too many; does not wait if there was one since the form read them. `label` is for
+            /// reports. A new record of the sources that this task reads.
+            WaitForReads = coordination::wait_for_reads, internal "%WAIT-FOR-READS" ("reads label")
                 shares points;
             /// A request of this task, made in a form with the request `outer`, which holds so much of the
             /// resource called `name`; `NIL` if others wait for that, or if there is not enough.
             RequestAtOnce = coordination::request_at_once, internal "%REQUEST-AT-ONCE"
                 ("name amount priority outer") shares points;
-            /// Takes from a request, if that is not `NIL`, what it holds: a claim of one resource alone, if
-            /// no request waits for that. Whether the request holds nothing now.
+            /// Takes the holdings from a request that is not `NIL`: a claim of one resource alone, if no
+            /// request waits for that. Whether the request holds nothing now.
             GiveBackAtOnce = coordination::give_back_at_once, internal "%GIVE-BACK-AT-ONCE" ("request")
                 shares points;
 
             // ---- tasks
             /// A new task that calls a function. `daemon` may be `:internal` for one that is not listed, or
             /// `:service` for one of these that has no bindings of this task and charges no account of its.
-            /// `notify` is a guard that is told of its end.
+            /// `notify` is a guard that its end signals.
             Spawn = task::spawn, internal "%SPAWN" ("function &optional name priority budget daemon notify")
                 shares own;
             /// New tasks, one for each function and name, that begin together: a net, and the tasks. They
-            /// have the priority of this task. `what` is for reports.
-            SpawnNet = net::spawn_net, internal "%SPAWN-NET" ("what names &rest functions") shares own;
+            /// have the priority of this task. `label` is for reports.
+            SpawnNet = net::spawn_net, internal "%SPAWN-NET" ("label names &rest functions") shares own;
             /// Waits until a task of a net has ended with one of `statuses`, and returns the first that has;
             /// or until all have ended, and returns `NIL`.
             AwaitNet = net::await_net, internal "%AWAIT-NET" ("net statuses") shares own;
@@ -1713,7 +1718,7 @@ macro_rules! for_each_builtin {
             Join = task::join, internal "%JOIN" ("task child") shares points;
             /// Asks for the end of a task.
             RequestAbort = task::request_abort, internal "%REQUEST-ABORT" ("task") shares points;
-            /// Ends a task wherever it is, and returns when its cleanups are over.
+            /// Aborts a task at its present place, and returns when its cleanups are over.
             AbortTask = task::abort_task, esl "ABORT-TASK" ("task") shares points;
             /// Notes a checkpoint of the running task, and signals it.
             AddCheckpoint = task::add_checkpoint, internal "%ADD-CHECKPOINT" ("id") shares points;
@@ -1721,22 +1726,22 @@ macro_rules! for_each_builtin {
             Checkpoints = task::checkpoints, internal "%CHECKPOINTS" ("task") shares points;
             /// The holdings of the running task: the list that `%SET-HELD` has noted last.
             Held = task::held, internal "%HELD" ("") shares nothing;
-            /// Notes a list of what the running task holds. At its end, before others are told of that, the
-            /// task calls `%RELEASE-HELD` as long as the list is not empty.
+            /// Notes the list of the holdings of the running task. At its end, before others learn of that,
+            /// the task calls `%RELEASE-HELD` as long as the list is not empty.
             SetHeld = task::set_held, internal "%SET-HELD" ("list") shares own;
             /// A guard by which the end of another task interrupts this one with a call of `function`.
             MakeGuard = task::make_guard, internal "%MAKE-GUARD" ("function") shares own;
             /// Interrupts a task, as soon as none of its cleanups runs, with a call of `function`.
             InterruptTask = task::interrupt_task, internal "%INTERRUPT-TASK" ("task function") shares points;
-            /// From now on only the end of this task is delivered, of what becomes pending, and its clock is
-            /// stopped if it is to; or, without `stands`, no longer.
+            /// Suspends this task: from now on, an abort is the only pending request that is delivered, and
+            /// its clock is stopped if that was requested. Without `stands`, ends that.
             StandStill = task::stand_still, internal "%STAND-STILL" ("stands stops-clock") shares own;
             /// The number of tasks made so far, and one above all places of those that there are.
             TasksMade = suspension::tasks_made, internal "%TASKS-MADE" ("") shares nothing;
             /// Adds to the lists in `generations`, by depth, the tasks of a part of the tree of `root`, those
             /// whose numbers are above `above` and not above `below`, from the places below `end`. Returns
             /// the `end` of the next part, `NIL` if the root has ended, and the largest depth. `depths` is a
-            /// vector of what is known.
+            /// vector of the known depths.
             TreePart = suspension::tree_part, internal "%TREE-PART"
                 ("root above below end depths generations") shares own;
             /// Has those of the first of `tasks` stand still that can do so where they wait, with the clock

@@ -12,18 +12,18 @@
 //! Numbers are never given twice. 0 and those from `0xC0` on belong to the virtual machine and are refused in
 //! files.
 //!
-//! The word after the mnemonic says how an instruction ends that cannot do its work, and what becomes of the
-//! value that a recovery puts in its place:
+//! The word after the mnemonic says how an instruction ends that cannot do its work, and where the value goes
+//! that a recovery puts in its place:
 //!
 //! - `silent`: it never fails. `jump` and `return` are silent instructions that control never passes through:
-//!   what follows them is reached from elsewhere.
+//!   the code behind them is reached from elsewhere.
 //! - `value`: the substitute goes to the first operand, a [`Dst`].
 //! - `test`: the substitute is the outcome of the test, which jumps if it holds; `test_not` jumps if it does
 //!   not. The last operand is the [`Jump`] or [`Back`].
 //! - `effect`: the substitute is dropped.
 //! - `call`: the substitutes are delivered as the results of the call; `tail` is a call in place of the
-//!   running function, whose results they are then. A [`CallTarget`] says what is called. The operands begin
-//!   with `window` and `count`; then comes `want`, unless it is a tail call.
+//!   running function, whose results they are then. A [`CallTarget`] names the called function. The operands
+//!   begin with `window` and `count`; then comes `want`, unless it is a tail call.
 //! - `never`: nothing could stand for its work, so a recovery can only have the instruction tried again, or
 //!   leave.
 //!
@@ -180,7 +180,7 @@ macro_rules! for_each_opcode {
             /// Jumps back unless `(< R[left] R[right])`.
             LoopNotLess = 0x45, "loop-not-less", test_not Less { left: Reg, right: Reg, to: Back };
             /// `R[counter] := R[counter] + step`, then jumps back if `(< R[counter] R[limit])`. The addition,
-            /// and with it the instruction, has no effect if either is no real number.
+            /// and with it the instruction, has no effect unless both are real numbers.
             LoopCount = 0x46, "loop-count", test
                 { counter: Reg, limit: Reg, step: Int8, to: Back }, test cold::loop_count;
 
@@ -231,7 +231,7 @@ macro_rules! for_each_opcode {
             // ---- variables
             /// `R[dst]` := a fresh box that holds `R[src]`
             MakeBox = 0x58, "make-box", never { dst: Dst, src: Reg }, does cold::make_box;
-            /// `R[dst]` := what the box `R[cell]` holds. The box must have been made by `make-box`.
+            /// `R[dst]` := the value in the box `R[cell]`. The box must have been made by `make-box`.
             BoxRef = 0x59, "box-ref", silent { dst: Dst, cell: Reg };
             /// The box `R[cell]` holds `R[src]`.
             BoxSet = 0x5A, "box-set", silent { cell: Reg, src: Reg };
@@ -244,7 +244,7 @@ macro_rules! for_each_opcode {
             PatchCapture = 0x5C, "patch-capture", silent { closure: Reg, index: Index, src: Reg };
             /// `R[dst]` := capture `index` of the running function
             CaptureRef = 0x5D, "capture-ref", silent { dst: Dst, index: Index };
-            /// `R[dst]` := what the box that is capture `index` of the running function holds
+            /// `R[dst]` := the value in the box that is capture `index` of the running function
             CaptureBoxRef = 0x5E, "capture-box-ref", silent { dst: Dst, index: Index };
             /// The box that is capture `index` of the running function holds `R[src]`.
             CaptureBoxSet = 0x5F, "capture-box-set", silent { src: Reg, index: Index };
@@ -286,7 +286,7 @@ macro_rules! for_each_opcode {
             /// As `call-global`, in place of the running function.
             TailCallGlobal = 0x6E, "tail-call-global", tail Global
                 { window: Window, count: Count, symbol: WideSymbolIdx };
-            /// As `call-builtin`; returns what the builtin returns.
+            /// As `call-builtin`; returns the values of the builtin.
             TailCallBuiltin = 0x6F, "tail-call-builtin", tail Builtin
                 { window: Window, count: Count, builtin: BuiltinIdx };
             /// Returns `R[src]`.
@@ -322,15 +322,15 @@ macro_rules! for_each_opcode {
             /// control goes to `to`.
             PushHandlerCase = 0x7B, "push-handler-case", never
                 { window: Window, types: VectorIdx, to: Landing }, does unwind::push_handler_case;
-            /// Pushes recovery procedures. `R[state]` is their table, a vector, or what the machine has made
-            /// of it. A throw to `R[state]` pops them, delivers two values to the window, and goes on at
-            /// `to`, where the function that runs the clauses is made: the machine makes it there when a
-            /// failure needs it first.
+            /// Pushes recovery procedures. `R[state]` is their table, a vector, or the state that the machine
+            /// has made of it. A throw to `R[state]` pops them, delivers two values to the window, and goes
+            /// on at `to`, where the function that runs the clauses is made: the machine makes it there when
+            /// a failure needs it first.
             PushRecovery = 0x84, "push-recovery", never
                 { window: Window, state: Reg, to: Landing }, does unwind::push_recovery;
             /// Pushes a cleanup for failures: when a failure, an abort or an expired limit leaves, the code
-            /// at `to` runs until `end-cleanup`. After a failure the value list is then that failure and what
-            /// is known about it.
+            /// at `to` runs until `end-cleanup`. After a failure the value list is then that failure and the
+            /// data about it.
             PushFailureCleanup = 0x85, "push-failure-cleanup", never
                 { window: Window, to: Landing }, does unwind::push_failure_cleanup;
             /// Pushes handlers that run at the point of signalling: `R[handlers]` is a list of `(type .
@@ -347,12 +347,12 @@ macro_rules! for_each_opcode {
             /// Ends the protected part in the normal way: the cleanup entry on top becomes a running cleanup,
             /// and control falls through into its code. The value list is kept until `end-cleanup`.
             EnterCleanup = 0x80, "enter-cleanup", silent {}, does unwind::enter_cleanup;
-            /// Ends a cleanup: goes on with what it interrupted, or with the next instruction after
-            /// `enter-cleanup`.
+            /// Ends a cleanup: continues the unwinding that it interrupted, or goes on with the next
+            /// instruction after `enter-cleanup`.
             EndCleanup = 0x81, "end-cleanup", silent {}, does unwind::end_cleanup;
             /// Throws the value list to the catch for the tag `R[tag]`. Fails with `control-error`, nothing
             /// unwound, when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2
-            /// `go`. Then the value list is what a recovery gave.
+            /// `go`. Then the value list is that of a recovery.
             Throw = 0x82, "throw", effect { tag: Reg, kind: ThrowKind };
 
             // ---- counting
@@ -404,7 +404,7 @@ impl Substitute {
 pub enum SlowHalf {
     /// There is no such function: the arm is the whole instruction.
     None,
-    /// The builtin that the row names does what the fast path of the arm leaves over.
+    /// The builtin that the row names does the work that the fast path of the arm leaves over.
     Builtin,
     /// `first`: as [`SlowHalf::Builtin`], after the function has been tried with the two operands. The
     /// function returns the value, or `UNBOUND` for operands that it leaves to the builtin. It asks for no
@@ -412,7 +412,7 @@ pub enum SlowHalf {
     First,
     /// `does`: the function does the whole instruction. It may fail, charge the task and ask for a safepoint.
     Does,
-    /// `rest`: as `does`, for what the fast path of the arm leaves over.
+    /// `rest`: as `does`, for the work that the fast path of the arm leaves over.
     Rest,
     /// `quiet`: as `does`, for a function that never fails, charges nothing and asks for nothing. Of a
     /// `return` it does all that comes before the return.
@@ -902,7 +902,7 @@ const _: () = {
                 assert!(is(operands[2].1, "Want"), "a call wants values; `tail` is for tail calls")
             }
             Substitute::Tail => {
-                assert!(!is(operands[2].1, "Want"), "nobody delivers the values of a tail call")
+                assert!(!is(operands[2].1, "Want"), "a tail call has no place for values")
             }
             Substitute::Silent | Substitute::Effect | Substitute::Never => {}
         }
@@ -912,7 +912,7 @@ const _: () = {
                 assert!(is(last, "Jump"), "`jumps` and `stays` need a Jump at their end")
             }
             SlowHalf::Test => {
-                assert!(matches!(substitute, Substitute::Test | Substitute::TestNot), "the row is no test")
+                assert!(matches!(substitute, Substitute::Test | Substitute::TestNot), "the row is not a test")
             }
             SlowHalf::First => assert!(opcode.builtin().is_some(), "`first` needs a builtin"),
             SlowHalf::None | SlowHalf::Builtin | SlowHalf::Does | SlowHalf::Rest | SlowHalf::Quiet => {}
