@@ -2,7 +2,7 @@
 //!
 //! Random code that the verifier accepts is run by the model, which takes every freedom that a real run has:
 //! tests go either way, instructions fail and are recovered from in all ways, anything that can land an
-//! unwinding does. Whatever the interpreter may assume (V1 to V11), the model checks.
+//! unwinding does. The model checks all assumptions of the interpreter (V1 to V11).
 
 mod support;
 
