@@ -60,7 +60,7 @@ fn every_name_of_common_lisp_is_defined_or_said_to_be_left_out() {
                      (handler-case (progn (typep 1 s) t) (error () nil)))
            (push s names))))";
     let silent = text(&mut engine(), silent);
-    // These are no functions and no variables: words of declarations, types and other places.
+    // These are neither functions nor variables: words of declarations, types and other places.
     let words = "variable structure standard method-combination otherwise declaration compiler-macro ftype type declare ignore \
                  ignorable special optimize inline notinline speed safety debug space compilation-speed dynamic-extent satisfies";
     let unknown: Vec<&str> =

@@ -2,9 +2,10 @@
 //! modules that exist, and each type in the glossary exists. So does each file that it, the other documents
 //! at the root and the READMEs of the crates name. Those list the public modules of their crates.
 //! The name of a type means one thing in the whole workspace. Errors have types, files are as long as one
-//! thing takes, comments are as narrow as code, and comments name the thing where they begin.
+//! thing takes, and comments are as narrow as code.
 
 mod dependencies;
+mod prose;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -196,7 +197,7 @@ fn path_in_tree(path: &Path) -> String {
     path.strip_prefix(root()).unwrap_or(path).to_string_lossy().replace('\\', "/")
 }
 
-/// Returns the files of Rust below a folder that are no tests.
+/// Returns the files of Rust below a folder that are not tests.
 fn product_sources(folder: PathBuf) -> Vec<PathBuf> {
     let mut files = sources(folder.clone());
     files.retain(|file| {
@@ -263,40 +264,6 @@ fn comments_of_programs_and_scripts_are_as_narrow() {
         wide.extend(lines.map(|(_, number)| format!("{}:{number}", path_in_tree(&path))));
     }
     assert!(wide.is_empty(), "comments wider than {COLUMNS} columns: {wide:#?}");
-}
-
-/// Returns the words of the comment or docstring on a line, and nothing for a line without either.
-fn words_of_comment<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
-    let code = line.trim_start();
-    let comment = match code.find(mark) {
-        Some(at) if at == 0 || code[..at].ends_with(' ') => &code[at..],
-        // Docstrings stand on lines of their own.
-        _ if mark == ";" && code.starts_with('"') => &code[1..],
-        _ => return None,
-    };
-    Some(comment.trim_start_matches(['/', '!', ';']).trim_start())
-}
-
-#[test]
-fn comments_name_the_thing() {
-    let programs =
-        ["stdlib", "world/modules", "robots/modules", "trees/modules"].map(|folder| root().join(folder));
-    let mut found = Vec::new();
-    for path in files_below(root().to_path_buf()) {
-        let mark = match path.extension().and_then(|extension| extension.to_str()) {
-            Some("rs") => "//",
-            Some("esl") if programs.iter().any(|folder| path.starts_with(folder)) => ";",
-            _ => continue,
-        };
-        let text = fs::read_to_string(&path).expect("a source can be read");
-        let comments = text.lines().zip(1..).filter_map(|(line, number)| {
-            let first = words_of_comment(line, mark)?.split(|c: char| !c.is_alphanumeric()).next()?;
-            ["What", "Who", "Whoever"].contains(&first).then_some(number)
-        });
-        found.extend(comments.map(|number| format!("{}:{number}", path_in_tree(&path))));
-    }
-    found.sort();
-    assert!(found.is_empty(), "name the thing; these comments begin with What or Who: {found:#?}");
 }
 
 /// Lines that a file may have.
