@@ -32,8 +32,7 @@ fn main() {
     PARTS.iter().for_each(|part| println!("cargo::rerun-if-changed={}load-order", part.folder));
     let folder =
         PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo names the folder of the package"));
-    let output =
-        PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo names the folder for what is built"));
+    let output = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo names the folder for built files"));
     std::fs::write(output.join("sources.rs"), sources(&folder)).expect("the list of sources can be written");
     match build(&folder) {
         Ok(images) => {

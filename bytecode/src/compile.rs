@@ -126,7 +126,7 @@ pub trait Environment {
     fn has_feature(&self, _name: &str) -> Option<bool> {
         None
     }
-    /// Returns whether an object that data refer to is a pair, which is no form.
+    /// Returns whether an object that data refer to is a pair, which is not a form.
     fn is_pair(&self, _object: ObjectId) -> bool {
         false
     }
@@ -344,8 +344,8 @@ pub trait Compile: Send {
     /// offset after it.
     ///
     /// # Errors
-    /// A diagnostic, for a text that is no datum; [`Diagnostic::code`] tells an unfinished one from a wrong
-    /// one.
+    /// A diagnostic, for a text that is not a datum; [`Diagnostic::code`] tells an unfinished one from a
+    /// wrong one.
     fn read(
         &self,
         environment: &mut dyn Environment,

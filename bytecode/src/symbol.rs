@@ -105,7 +105,7 @@ impl Symbol {
 /// rest of the number.
 const SETF_CELL: u32 = 1 << 31;
 
-/// Numbers of uninterned symbols that are no such cells.
+/// Numbers of uninterned symbols that are not such cells.
 pub const UNINTERNED_NUMBERS: u32 = SETF_CELL - 1;
 
 /// Returns the symbol that keeps the global function `(setf symbol)`: one of the same package, or uninterned

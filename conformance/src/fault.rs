@@ -28,7 +28,7 @@ pub enum LineFault {
     NoColon,
     /// The program fails in another place already.
     SecondFailure,
-    /// An exit status is no number from 0 to 255.
+    /// An exit status is not a number from 0 to 255.
     NoStatus,
     /// There is no expectation of this name.
     UnknownExpectation(String),

@@ -117,8 +117,8 @@ impl Styles {
         Styles { shapes }
     }
 
-    /// Adds the macros that a text defines, also local ones. What was known before of their names is
-    /// forgotten if `is_newer`, and kept otherwise.
+    /// Adds the macros that a text defines, also local ones. Earlier macros of their names are forgotten if
+    /// `is_newer`, and kept otherwise.
     pub fn add_macros(&mut self, tree: &SyntaxTree, is_newer: bool) {
         for node in tree.nodes().filter(|&node| tree.kind(node) == SyntaxKind::List) {
             match tree.operator(node).as_deref() {

@@ -71,7 +71,7 @@ pub fn is_alphanumeric(code: u32) -> bool {
 }
 
 /// Returns whether `code` is a superscript, a fraction, or a number in a circle. These count as numbers but
-/// are no digits.
+/// are not digits.
 fn is_small_number(code: u32) -> bool {
     matches!(code, 0xB2 | 0xB3 | 0xB9 | 0xBC..=0xBE | 0x2070..=0x209F | 0x2150..=0x218F | 0x2460..=0x24FF | 0x2776..=0x2793)
 }

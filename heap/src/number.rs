@@ -84,7 +84,7 @@ pub fn same_value(heap: &Heap, a: Value, b: Value) -> bool {
     }
 }
 
-/// Returns whether a complex number with these parts has the value of `v`, which is no complex number.
+/// Returns whether a complex number with these parts has the value of `v`, which is not a complex number.
 fn is_like(heap: &Heap, real: Value, imaginary: Value, v: Value) -> bool {
     is_zero(heap, imaginary) && same_value(heap, real, v)
 }

@@ -89,7 +89,7 @@ struct InboxState {
     clock: ExternalClock,
     /// A bit for each signal of the process that the program handles, by number.
     handled: AtomicU32,
-    /// Whom to wake when the inbox is rung.
+    /// The task to wake when the inbox is rung.
     waker: Mutex<Option<Waker>>,
 }
 

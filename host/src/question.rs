@@ -96,7 +96,7 @@ pub struct TaskInfo {
 pub enum Answer {
     /// The values of the call.
     Values(Vec<Datum>),
-    /// A value contains itself, so it is no data.
+    /// A value contains itself, so it is not data.
     Circular,
     /// A value is too large.
     TooLarge,

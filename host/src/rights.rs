@@ -27,8 +27,8 @@ pub enum Right {
     Env,
     /// Using serial ports; the object is a path.
     Serial,
-    /// Reading modules that the program requires; the object is a path. It is no right of its own: it comes
-    /// with the folders of modules, or with [`Right::Read`].
+    /// Reading modules that the program requires; the object is a path. It is not a right of its own: it
+    /// comes with the folders of modules, or with [`Right::Read`].
     Module,
 }
 
@@ -238,7 +238,7 @@ pub(super) fn resolve(path: &str) -> PathBuf {
                         links += 1;
                         rest.extend(parts(&target));
                     }
-                    // It is no link, or nothing is there; or the system will refuse so many links.
+                    // It is not a link, or nothing is there; or the system will refuse so many links.
                     _ => resolved = next,
                 }
             }

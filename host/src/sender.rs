@@ -193,7 +193,7 @@ impl Drop for Membership {
 /// A handle outside that may signal the inputs of a machine. While one exists, a waiting program is not
 /// deadlocked.
 ///
-/// Clones are the same sender. What is sent comes into the inbox in the order of sending.
+/// Clones are the same sender. Signals come into the inbox in the order of sending.
 #[derive(Clone)]
 pub struct Sender(Arc<Membership>);
 

@@ -60,7 +60,7 @@ pub(super) fn answer(project: &Project, request: Request) -> Response {
             expand::execute(project, &p).map(|text| Some(text.into()))
         }),
         method => {
-            let message = format!("`{method}` is not among what this server offers");
+            let message = format!("this server does not offer `{method}`");
             Response::new_err(request.id, ErrorCode::MethodNotFound as i32, message)
         }
     }

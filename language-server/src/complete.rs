@@ -285,7 +285,7 @@ const DECLARATIONS: [(&str, &str); 11] = [
     ("ftype", "These functions are of a type; not checked."),
     ("inline", "Calls of these functions may be replaced by their bodies; without effect."),
     ("notinline", "Calls of these functions stay calls; without effect."),
-    ("optimize", "What the compiler is to favour; without effect."),
+    ("optimize", "The qualities that the compiler favours; without effect."),
     ("dynamic-extent", "These values are not needed later; without effect."),
     ("values", "The types of the values; not checked."),
     ("indent", "The number of arguments of a macro before its body, for `eslc format`."),

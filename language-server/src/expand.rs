@@ -21,7 +21,7 @@ const MARK: &str = "(quote %esl-lsp-form)";
 pub(super) enum NoExpansion {
     /// There is no command of this name.
     UnknownCommand(String),
-    /// The argument is no text and position.
+    /// The argument does not consist of a text and a position.
     Argument(serde_json::Error),
     /// The text is not open.
     NotOpen,

@@ -33,7 +33,7 @@ fn symbol_kind(kind: DefinedAs) -> SymbolKind {
     }
 }
 
-/// Answers what a text defines. What a structure defines besides stands inside it.
+/// Answers what a text defines. Further definitions by a structure stand inside it.
 pub(super) fn symbols(
     project: &Project,
     parameters: &DocumentSymbolParams,

@@ -59,7 +59,7 @@ fn bare_place(text: &OpenText, node: NodeId) -> Range<usize> {
 pub(super) enum RenameRefusal {
     /// There is no name at the position.
     NothingHere,
-    /// The text is no name.
+    /// The text is not a name.
     NotAName(String),
     /// The name does not belong to this program.
     Foreign(String),

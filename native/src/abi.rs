@@ -55,7 +55,7 @@ pub type NativeStore = unsafe extern "C" fn(*mut NativeContext, *mut u64, u64);
 /// at no frame.
 pub type NativeValueOf = unsafe extern "C" fn(*mut NativeContext, u64) -> u64;
 
-/// Function of the machine that sets a symbol that was bound and is no constant. It reads no frame.
+/// Function of the machine that sets a symbol that was bound and is not a constant. It reads no frame.
 pub type NativeSetValueOf = unsafe extern "C" fn(*mut NativeContext, u64, u64);
 
 /// Function of the machine that makes a pair, or returns 0 if that takes more than a hole of the heap. It

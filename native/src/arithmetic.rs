@@ -202,7 +202,7 @@ impl Translator<'_, '_> {
         }
     }
 
-    /// Jumps to `done` with the word of the result of two doubles; a result that is no word goes to
+    /// Jumps to `done` with the word of the result of two doubles; a result that is not a word goes to
     /// `otherwise`.
     fn on_doubles(&mut self, operation: Arithmetic, p: Ssa, q: Ssa, otherwise: Block, done: Block) {
         let result = self.operate(operation, p, q);
@@ -345,8 +345,8 @@ impl Translator<'_, '_> {
         self.finish_value(slow, done, dst, Known::Nothing);
     }
 
-    /// Returns the test of two numbers of which one is known to be a double; what is no double without a box
-    /// goes to `slow`, and so does a fixnum, which is compared exactly.
+    /// Returns the test of two numbers of which one is known to be a double; a value that is not a double
+    /// without a box goes to `slow`, and so does a fixnum, which is compared exactly.
     fn order_with_double(&mut self, order: NumberOrder, left: u8, right: u8, slow: Block) -> Option<Ssa> {
         let is_double = |register: u8| self.known[usize::from(register)] == Known::Double;
         if !is_double(left) && !is_double(right) {

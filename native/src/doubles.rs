@@ -18,7 +18,7 @@ use crate::kinds::Known;
 use crate::places::RegisterBits;
 use crate::translate::Translator;
 
-/// The two lowest bits of the word of a double that needs no box and is no zero.
+/// The two lowest bits of the word of a double that needs no box and is not zero.
 pub(crate) const TAG_DOUBLE: u64 = 3;
 
 /// Makes bits 61 and 62 of such doubles zero, where their bias makes them ones.

@@ -1,6 +1,6 @@
 //! The translation of one instruction: each has the fast paths that the interpreter's arm has, under the same
-//! conditions; what they do not take goes to the machine, which does the instruction's slow half. What has no
-//! translation here is left to the machine as a whole.
+//! conditions; what they do not take goes to the machine, which does the instruction's slow half. An
+//! instruction without a translation is left to the machine as a whole.
 
 use std::mem::offset_of;
 

@@ -224,7 +224,7 @@ impl Translator<'_, '_> {
         self.go_to(same);
         let number = self.b.ins().ushr_imm_s(link, 1);
         let number = self.b.ins().band_imm_s(number, (1 << HashTable::NUMBER_BITS) - 1);
-        // A link that leads nowhere has number 0, so that this is no entry.
+        // A link that leads nowhere has number 0, so that this is not an entry.
         let number = self.b.ins().iadd_imm_s(number, -1);
         let entry = self.entry_with_key(search, number, slow);
         let n = self.b.ins().sshr_imm_s(key, 2);

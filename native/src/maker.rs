@@ -71,7 +71,7 @@ pub struct NativeSource {
 /// Why no machine code was made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NotMade {
-    /// The function is too long, or it is no code that the verifier takes.
+    /// The function is too long, or its code is not one that the verifier takes.
     Unfit,
     /// This processor or system is not known to the code generator, or memory may not be executed.
     Unsupported(String),

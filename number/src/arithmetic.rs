@@ -16,7 +16,7 @@ pub fn add(numbers: &mut Numbers<'_>, a: Value, b: Value) -> NumberResult {
     add_others(numbers, a, b)
 }
 
-/// Adds what are no fixnums, or have no fixnum for their sum.
+/// Adds numbers that are not fixnums, or whose sum is not a fixnum.
 #[inline(never)]
 fn add_others(numbers: &mut Numbers<'_>, a: Value, b: Value) -> NumberResult {
     if let Some((x, y)) = unboxed_doubles(a, b) {

@@ -107,7 +107,7 @@ impl fmt::Display for OperateError {
             OperateError::Tls(error) => error.fmt(f),
             OperateError::Exposed(address) => write!(
                 f,
-                "others could hear what is said at {address}: use --certificate FILE --key FILE, or a port of \
+                "others could read the traffic at {address}: use --certificate FILE --key FILE, or a port of \
                  127.0.0.1, which others reach by ssh -L"
             ),
             OperateError::Path(path, Some(error)) => {

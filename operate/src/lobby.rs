@@ -92,7 +92,7 @@ impl Drop for VisitState {
         let mut state = self.lobby.lock();
         let guests = state.guests.len();
         state.guests.retain(|guest| guest.number != self.number);
-        // One that was told to end is no guest any more, and was not settled.
+        // One that was told to end is not a guest any more, and was not settled.
         state.settled -= usize::from(guests == state.guests.len() && self.is_settled.load(Ordering::Relaxed));
     }
 }

@@ -79,7 +79,7 @@ type InputFigure = fn(&esl_host::InputRow) -> u64;
 fn text_of(survey: &Survey) -> String {
     let figures = &survey.figures;
     let mut text = Exposition::default();
-    text.begin("esl_tasks", "gauge", "Tasks of the program that have not ended, by what they do.");
+    text.begin("esl_tasks", "gauge", "Tasks of the program that have not ended, by state.");
     for (standing, count) in TaskStanding::ALL.into_iter().zip(figures.tasks) {
         text.sample("esl_tasks", Some(("state", standing.name())), count);
     }

@@ -38,7 +38,7 @@ pub(super) enum OperatorRefusal {
         /// Name of the other.
         only: &'static str,
     },
-    /// The text is no data.
+    /// The text is not data.
     NotData {
         /// The text.
         text: String,
@@ -118,15 +118,15 @@ impl fmt::Display for OperatorRefusal {
             }
             OperatorRefusal::TooManyRequests => f.write_str("too many requests are under way"),
             OperatorRefusal::Silent => f.write_str("the machine does not answer"),
-            OperatorRefusal::Late => f.write_str("the run has not done it yet"),
-            OperatorRefusal::NotDone => f.write_str("it was not done"),
+            OperatorRefusal::Late => f.write_str("the run has not completed the request yet"),
+            OperatorRefusal::NotDone => f.write_str("the request was not completed"),
             OperatorRefusal::Failed(text) => f.write_str(text),
             OperatorRefusal::Aborted => f.write_str("aborted"),
-            OperatorRefusal::Left => f.write_str("the task has left"),
+            OperatorRefusal::Left => f.write_str("the task has left the debugger"),
             OperatorRefusal::ValueTooLarge => f.write_str("the value is too large"),
             OperatorRefusal::AnswerTooLarge => f.write_str("the answer is too large"),
             OperatorRefusal::Ended => f.write_str("the run has ended"),
-            OperatorRefusal::OtherAnswer => f.write_str("it has another answer"),
+            OperatorRefusal::OtherAnswer => f.write_str("the run has given an answer of another kind"),
         }
     }
 }

@@ -12,15 +12,15 @@ use super::pattern::{FactPattern, NotAPattern};
 /// Reason why a text names no place to go to, or nothing to stop at.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StopError {
-    /// The text is no number.
+    /// The text is not a number.
     NotANumber(String),
-    /// The text is no number of seconds, or one that no run has.
+    /// The text is not a number of seconds, or is one that no run has.
     NotSeconds(String),
     /// The text names no kind of place.
     NotAPlace,
     /// A name is missing.
     NoName,
-    /// The text is no pattern of facts.
+    /// The text is not a pattern of facts.
     Pattern(NotAPattern),
     /// The text names no kind of breakpoint.
     NotABreakpoint,

@@ -455,7 +455,9 @@ impl Debugger {
             (TaskResult::Running, RunOutcome::TicksUsed) => {
                 output.push_str(&format!("The form does not end within {FORM_TICKS} ticks.\n"));
             }
-            (TaskResult::Running, _) => output.push_str("The form waits for what other tasks would do.\n"),
+            (TaskResult::Running, _) => {
+                output.push_str("The form waits for other tasks, which do not run in the copy.\n")
+            }
             (TaskResult::Aborted, _) => output.push_str("Aborted\n"),
             (TaskResult::Succeeded(values), _) => {
                 let value = values.first().and_then(|&value| machine.export(value).ok());

@@ -108,7 +108,7 @@ pub struct Recorded {
     pub torn: usize,
 }
 
-/// Why bytes are no recorded run.
+/// Why bytes are not a recorded run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RecordedError {
@@ -399,7 +399,7 @@ impl Recorded {
                 is_ours = ByteReader(content).text().is_none_or(is_own);
             }
             let strange = |problem| if is_ours { damaged(problem) } else { RecordedError::OtherMachine };
-            let malformed = || strange("the content is not what its kind says");
+            let malformed = || strange("the content is not of its kind");
             match kind {
                 kind::HEADER => beginning = Some(read_beginning(content).ok_or_else(malformed)?),
                 kind::RECORDS => add_records(&mut records, content, &mut before).ok_or_else(malformed)?,

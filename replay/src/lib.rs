@@ -84,7 +84,7 @@ pub enum ReplayError {
     Program(WriteError),
     /// The machine cannot be made, or the program not begun.
     Machine(Error),
-    /// The bytes of the file are no recorded run.
+    /// The bytes of the file are not a recorded run.
     Recording(RecordedError),
     /// It cannot be run again.
     Rerun(RerunError),

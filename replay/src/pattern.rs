@@ -9,7 +9,7 @@ enum Item {
     List(Vec<Item>),
 }
 
-/// A text that is no pattern.
+/// A text that is not a pattern.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NotAPattern(String);
 

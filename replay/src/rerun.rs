@@ -61,7 +61,7 @@ pub struct Rerun {
 }
 
 impl Rerun {
-    /// Makes a machine that is about to run the program. What it prints goes to `screen`.
+    /// Makes a machine that is about to run the program. Its output goes to `screen`.
     ///
     /// # Errors
     /// [`RerunError`].

@@ -53,7 +53,7 @@ impl Engine {
     /// Evaluates a text whose value is a function, and keeps that for Rust code.
     ///
     /// # Errors
-    /// As [`Engine::eval`]; [`Error::NotOfType`] if the value is no function.
+    /// As [`Engine::eval`]; [`Error::NotOfType`] if the value is not a function.
     pub fn function(&mut self, text: &str) -> Result<Function, Error> {
         let value = self.value_of(text, None)?;
         if self.machine.is_function(value) {

@@ -20,10 +20,10 @@ use crate::error::Error;
 
 /// A way into a run for other threads, and for other parts of the program that owns the engine.
 ///
-/// It may be cloned and sent, and holds no lock of the engine's. What it says and asks comes into the inbox
-/// of the machine in order, and is taken in between two turns while the engine runs. While there is a handle,
-/// something may come: a program that waits is not deadlocked. What a handle says after the engine is gone
-/// has no effect, and what it asks then ends with [`Error::Ended`].
+/// It may be cloned and sent, and holds no lock of the engine's. Its signals and questions come into the
+/// inbox of the machine in order, and are taken in between two turns while the engine runs. While there is a
+/// handle, something may come: a program that waits is not deadlocked. Signals after the end of the engine
+/// have no effect, and questions then end with [`Error::Ended`].
 ///
 /// ```
 /// use esl::Engine;

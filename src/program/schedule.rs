@@ -53,7 +53,7 @@ pub struct Schedule {
     choices: Vec<u32>,
 }
 
-/// Why a text is no schedule.
+/// Why a text is not a schedule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ScheduleError {
     /// It does not begin as a schedule does.
@@ -91,7 +91,7 @@ impl Schedule {
     /// Parses the text of a file.
     ///
     /// # Errors
-    /// [`ScheduleError`], if it is no schedule.
+    /// [`ScheduleError`], if it is not a schedule.
     pub fn parse(text: &str) -> Result<Schedule, ScheduleError> {
         let mut lines = text.lines();
         match lines.next() {

@@ -53,7 +53,7 @@ pub(super) fn mark_length(token: Token, text: &str) -> usize {
 }
 
 impl TreeBuilder {
-    /// Takes all of a text. What is open at its end stays so.
+    /// Takes all of a text. Lists that are open at its end stay open.
     fn new(text: &str, broken_from: usize) -> TreeBuilder {
         let root = SyntaxNode {
             kind: SyntaxKind::Root,

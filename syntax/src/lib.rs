@@ -1,8 +1,8 @@
 //! The lossless syntax tree: every list, mark, token and comment of a text, with its place.
 //!
 //! Guarantees: any text has a tree, also one that cannot be read: a list without an end reaches to the end of
-//! the text, and a `)` too many is a node of its own. What lies between nodes is blank. Building takes time
-//! in proportion to the text, without native recursion. Not here: what names mean (the compiler), the data of
+//! the text, and a `)` too many is a node of its own. The text between nodes is blank. Building takes time in
+//! proportion to the text, without native recursion. Not here: what names mean (the compiler), the data of
 //! the text (its reader, whose lexer finds the tokens here too).
 //!
 //! ```
@@ -186,7 +186,7 @@ impl SyntaxTree {
         place.start + length
     }
 
-    /// Returns the name that a node is, as it is written; `None` if it is no name.
+    /// Returns the name that a node is, as it is written; `None` if it is not a name.
     pub fn name(&self, node: NodeId) -> Option<&str> {
         match self.kind(node) {
             SyntaxKind::Leaf(Token::Atom | Token::Escaped) => Some(self.text(node)),

@@ -148,7 +148,7 @@ impl Observer for Drawing {
             Seen::IsReady => self.change(time, task, Some(Activity::Ready)),
             Seen::Waits(reason) => self.change(time, task, Some(Activity::Waits(reason.into()))),
             Seen::IsSuspended(reason) => self.change(time, task, Some(Activity::IsSuspended(reason.into()))),
-            Seen::IsToEnd => self.mark(time, task, Sign::IsToEnd, "is to be aborted".into()),
+            Seen::IsToEnd => self.mark(time, task, Sign::IsToEnd, "abort requested".into()),
             Seen::Ends(how) => {
                 self.change(time, task, None);
                 let how = ["succeeded", "failed", "aborted"].into_iter().find(|known| *known == how);
@@ -345,7 +345,7 @@ fn legend(svg: &mut String) {
     let signs = [
         (Sign::Fails, "fails"),
         (Sign::Recovers, "recovers"),
-        (Sign::IsToEnd, "is to be aborted"),
+        (Sign::IsToEnd, "abort requested"),
         (Sign::Ends("succeeded"), "succeeded"),
         (Sign::Ends("failed"), "failed"),
         (Sign::Ends("aborted"), "aborted"),

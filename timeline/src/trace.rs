@@ -154,7 +154,7 @@ impl<W: Write + Send> Observer for Trace<W> {
             Seen::Waits(reason) | Seen::IsSuspended(reason) => {
                 self.change(task, Some(format!("waits for {reason}")));
             }
-            Seen::IsToEnd => self.mark(task, "is to be aborted", "task"),
+            Seen::IsToEnd => self.mark(task, "abort requested", "task"),
             Seen::Ends(how) => {
                 self.change(task, None);
                 self.mark(task, how, "task");

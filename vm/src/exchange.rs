@@ -1,8 +1,8 @@
 //! Data that pass between the interpreter and builtins beside arguments and results.
 //!
-//! A builtin gets the machine and its arguments and returns an [`Outcome`](crate::raise::Outcome). Whatever
-//! else it has to say (the failure behind an [`Exit::Raise`], the values behind an [`Exit::Values`], the call
-//! behind an [`Exit::Call`], and what its work has cost) waits here until the interpreter takes it.
+//! A builtin gets the machine and its arguments and returns an [`Outcome`](crate::raise::Outcome). Further
+//! results (the failure behind an [`Exit::Raise`], the values behind an [`Exit::Values`], the call behind an
+//! [`Exit::Call`], and the cost of its work) wait here until the interpreter takes them.
 
 use crate::heap::Heap;
 use crate::lookup::{Lookup, Lookups, STEPS_FOR_NOTHING};

@@ -2,7 +2,7 @@
 //!
 //! A failure leaves Rust as data: a [`Raised`] waits in the exchange while the builtin returns
 //! [`Exit::Raise`]. The interpreter then calls the library function `%raise` at the point of failure, in a
-//! frame above the failed instruction; nothing has been unwound. What `%raise` returns takes the place of the
+//! frame above the failed instruction; nothing has been unwound. The values of `%raise` take the place of the
 //! operation's result.
 
 use esl_bytecode::builtin::{BuiltinInfo, Visibility};

@@ -177,8 +177,8 @@ struct SeenRegister {
 
 #[cfg(feature = "native")]
 impl SeenRegister {
-    /// Returns what it held mostly. What has not been written yet holds `nil`, which does not tell against a
-    /// double.
+    /// Returns what it held mostly. A register that has not been written yet holds `nil`, which does not tell
+    /// against a double.
     fn guess(&self) -> Known {
         let [doubles, fixnums, nils, others] =
             [self.doubles, self.fixnums, self.nils, self.others].map(u32::from);

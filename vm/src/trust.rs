@@ -141,7 +141,7 @@ pub(crate) fn alloc_stub(
     captures: usize,
     word: u32,
 ) -> Result<Value, AllocError> {
-    assert_ne!(shape.kind, CodeKind::Bytecode, "a stub is no bytecode");
+    assert_ne!(shape.kind, CodeKind::Bytecode, "a stub is not bytecode");
     let parts = CodeParts {
         name,
         debug: Value::NIL,
@@ -181,7 +181,7 @@ pub(crate) fn alloc_function(heap: &mut Heap, code: Value, captures: &[Value]) -
     unsafe { heap.alloc_function(code, captures) }
 }
 
-/// Sets a capture of a stub's function; `None` if its code is no stub, or has no such capture.
+/// Sets a capture of a stub's function; `None` if its code is not a stub, or has no such capture.
 pub(crate) fn set_stub_capture(heap: &mut Heap, function: Value, index: usize, value: Value) -> Option<()> {
     if is_bytecode(heap, function)? {
         return None;

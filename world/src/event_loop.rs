@@ -54,7 +54,7 @@ pub(crate) trait Stoppable: Future<Output = ()> + Send + Unpin + 'static {
 }
 
 /// Begins a future here, if there is an event loop. Later it goes on in the thread that wakes it, mostly
-/// that of the event loop: it is no task of that, which would be larger, and would have to be told each
+/// that of the event loop: it is not a task of that, which would be larger, and would have to be told each
 /// time. It is dropped if it panics.
 ///
 /// # Errors

@@ -44,7 +44,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         spawned,
         "%SERIAL-OPEN",
         ["socket", "path", "baud", "data-bits", "parity", "stop-bits", "flow-control"],
-        "Has SOCKET be the serial port PATH.",
+        "Opens the serial port PATH as SOCKET.",
         |socket: HostHandle<Socket>,
          path: String,
          baud: u32,

@@ -316,8 +316,8 @@ impl Datum {
         }
     }
 
-    /// Returns the elements of a list, in order. Stops at the first tail that is no pair; [`Elements::tail`]
-    /// gives it.
+    /// Returns the elements of a list, in order. Stops at the first tail that is not a pair;
+    /// [`Elements::tail`] gives it.
     pub fn elements(&self) -> Elements<'_> {
         Elements { rest: self }
     }

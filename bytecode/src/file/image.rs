@@ -55,7 +55,7 @@ impl ModuleImage {
     /// Opens a file and compares all checksums.
     ///
     /// # Errors
-    /// [`ReadError`] for bytes that are no file of this version and these tables, or are damaged.
+    /// [`ReadError`] for bytes that are not a file of this version and these tables, or are damaged.
     pub fn open(bytes: ImageBytes) -> Result<ModuleImage, ReadError> {
         let image = ModuleImage::open_trusted(bytes)?;
         let mut header = Cursor::new(&image.bytes, 0, None);
@@ -80,7 +80,7 @@ impl ModuleImage {
     /// looked at.
     ///
     /// # Errors
-    /// [`ReadError`] for bytes that are no file of this version and these tables.
+    /// [`ReadError`] for bytes that are not a file of this version and these tables.
     pub fn open_trusted(bytes: ImageBytes) -> Result<ModuleImage, ReadError> {
         let sections = read_header(&bytes)?;
         let mut image = ModuleImage {

@@ -143,7 +143,7 @@ pub fn checksum(file: &[u8]) -> Option<u32> {
 /// run.
 ///
 /// # Errors
-/// [`ReadError`] for bytes that are no intact file of this version.
+/// [`ReadError`] for bytes that are not an intact file of this version.
 pub fn read(bytes: &[u8]) -> Result<Module, ReadError> {
     ModuleImage::open(ImageBytes::Shared(bytes.into()))?.to_module()
 }

@@ -196,7 +196,7 @@ impl fmt::Display for Fault {
             }
             Fault::TypeCode(code) => write!(f, "no type code has the number {code}"),
             Fault::Builtin(number) => write!(f, "no builtin has the number {number}"),
-            Fault::Arguments(count) => write!(f, "what is called does not take {count} arguments"),
+            Fault::Arguments(count) => write!(f, "the called function does not take {count} arguments"),
             Fault::Want(want) => write!(f, "invalid number of wanted values {want}"),
             Fault::ThrowKind(kind) => write!(f, "unknown kind of throw {kind}"),
             Fault::Unassigned(register) => write!(f, "reads r{register}, which holds nothing on some path"),

@@ -147,9 +147,9 @@ enum EslcAction {
     ///
     /// Blanks, indentation, lone parentheses and blank lines are put right, and lines of more than 100
     /// columns are broken; other lines keep their breaks. Comments, strings and all that is read stay the
-    /// same. What stands under what follows from the operators: library macros and those that the file and
-    /// its modules define are indented by the `&body` of their lambda lists, or as `(declare (indent N))`
-    /// says in them.
+    /// same. The indentation follows from the operators: library macros and those that the file and its
+    /// modules define are indented by the `&body` of their lambda lists, or as `(declare (indent N))` says in
+    /// them.
     #[command(visible_alias = "fmt")]
     Format {
         #[command(flatten)]
@@ -332,7 +332,8 @@ fn check(paths: &[PathBuf], options: &SourceOptions) -> Result<u8, u8> {
     Ok(status)
 }
 
-/// Checks files as one program. What was told before, of a module that several files require, is left out.
+/// Checks files as one program. Diagnostics that were reported before, of a module that several files
+/// require, are left out.
 fn check_program(
     files: &[PathBuf],
     options: &SourceOptions,

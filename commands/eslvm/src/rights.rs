@@ -97,7 +97,7 @@ fn read(file: &Path) -> Result<Rights, u8> {
 /// Returns the rights of a file: a flag a line, as on the command line; `#` begins a comment.
 ///
 /// # Errors
-/// The number of the first line that is no flag, and the reason.
+/// The number of the first line that is not a flag, and the reason.
 fn parse(text: &str) -> Result<Rights, (usize, String)> {
     let mut rights = Rights::none();
     for (index, line) in text.lines().enumerate() {

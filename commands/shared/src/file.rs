@@ -11,7 +11,7 @@ use esl_compiler::reader::decode;
 
 use super::{NOT_COMPILED, USAGE, complain};
 
-/// Size in bytes beyond which a file is refused: such a file is no source, or never ends.
+/// Size in bytes beyond which a file is refused: such a file is not a source, or never ends.
 const MAX_BYTES: u64 = 64 << 20;
 
 /// Extensions of the names of sources.

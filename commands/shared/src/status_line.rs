@@ -1,5 +1,5 @@
 //! A line at the terminal that says how far a long job is: erased when the job is over, and never seen where
-//! standard error is no terminal.
+//! standard error is not a terminal.
 
 use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -34,7 +34,7 @@ pub struct StatusLine {
 }
 
 impl StatusLine {
-    /// Begins a job. It has no line if `is_quiet` or if standard error is no terminal.
+    /// Begins a job. It has no line if `is_quiet` or if standard error is not a terminal.
     pub fn new(is_quiet: bool) -> StatusLine {
         let screen: Box<dyn Write + Send> = Box::new(std::io::stderr());
         let screen = (!is_quiet && is_screen()).then(|| Mutex::new((screen, false)));
@@ -66,11 +66,11 @@ impl StatusLine {
     pub fn show(&self, line: &str) {
         let Some(screen) = &self.screen else { return };
         let (screen, is_shown) = &mut *screen.lock().unwrap_or_else(PoisonError::into_inner);
-        // A line that is too long would go on in the next one, which is not erased. What a terminal obeys is
-        // no part of it.
+        // A line that is too long would go on in the next one, which is not erased. Control characters are
+        // not part of it.
         let width = self.columns.saturating_sub(1);
         let line: String = line.chars().filter(|c| !c.is_control()).take(width).collect();
-        // A terminal that does not take the line is no reason to stop.
+        // A terminal that does not take the line is not a reason to stop.
         _ = write!(screen, "\r\x1b[K{line}").and_then(|()| screen.flush());
         *is_shown = true;
     }

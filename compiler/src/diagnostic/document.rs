@@ -11,7 +11,7 @@ pub fn markdown() -> String {
     let mut page = String::from(
         "# Diagnostics\n\n\
          The compiler's findings about a program, by code. An *error* means that the program does not\n\
-         compile, a *warning* that it compiles, but probably does not do what was meant.\n\n\
+         compile, a *warning* that it compiles, but probably contains a mistake.\n\n\
          This page is generated from `compiler/src/diagnostic/code.rs`.\n",
     );
     for stage in Stage::ALL {

@@ -38,7 +38,7 @@
 //! Calls of the functions `(%slot 'class index instance)`, `(%set-slot 'class index instance value)` and
 //! `(%instance-p 'class object)` are opened up if class and index are literal.
 //!
-//! # What the library records
+//! # Records of the library
 //!
 //! The property `%setf` of a symbol `f` says how `(f argument…)` is set:
 //!
@@ -59,7 +59,7 @@
 //! The property `%symbol-macro` of a symbol is the form that it stands for as a variable
 //! (`define-symbol-macro`).
 //!
-//! # What the expander calls
+//! # Functions that the expander calls
 //!
 //! The library functions that `destructure.rs` describes; for places, `(%putf list indicator value)`, which
 //! returns the property list with that value, and `(%remf list indicator)`, which returns the property list

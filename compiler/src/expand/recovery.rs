@@ -124,8 +124,8 @@ impl Expander {
     /// Warns if control can reach the end of a recovery clause that does not say that its value is meant.
     pub(super) fn check_clause(&mut self, to: To, is_empty: bool) {
         if is_empty || !ends(self.core(), to.node, EndQuestion::LeavesOrResumes) {
-            let message = "this clause can end without saying how to go on, and its value then stands for \
-                           that of the operation that failed";
+            let message = "this clause can end without a retry, an abort or a failure: its value then replaces \
+                           that of the failed operation";
             let help = "end it with `(retry)`, `(abort …)` or `(fail …)`, or with `(values …)` to go on \
                         behind the failure";
             self.report(code::CLAUSE_FALLS_OFF.at(to.span, message.to_string()).help(help), to.origin);

@@ -145,7 +145,7 @@ impl Reader {
         if self.errors == MAX_ERRORS && !is_over {
             let message = format!("expected fewer than {MAX_ERRORS} errors, found so many");
             let last = code::TOO_MANY_ERRORS.at(error.primary.span, message);
-            self.waiting = vec![last.label("the text is not read any further")];
+            self.waiting = vec![last.label("the rest of the text is not read")];
             self.position = self.text.len();
         }
         Some(Err(Box::new(error)))

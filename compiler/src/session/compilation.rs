@@ -198,7 +198,7 @@ impl CompilationState {
             StepOutcome::Expansion(read) => queue.take_read(&read),
             StepOutcome::Failed(failure) => {
                 let message = format!("this cannot be read as `*readtable*` says: {}", failure.report);
-                let help = "what follows is not compiled";
+                let help = "the forms behind it are not compiled";
                 self.diagnostics
                     .push(code::READ_TIME_FAILURE.at(queue.give_up_reading(), message).help(help));
             }
@@ -335,11 +335,11 @@ impl CompilationState {
         let mut errors = self.diagnostics.iter_mut().rev();
         if let Some(last) = errors.find(|diagnostic| diagnostic.severity == Severity::Error) {
             let help = if last.code == code::UNKNOWN_PACKAGE.name {
-                "what follows is not compiled, since its names depend on this. The whole file is compiled before \
+                "the forms behind it are not compiled, since their names depend on this. The whole file is compiled before \
                  any of it runs, `load` too: if another file makes the package, call that `NAME.esl`, and write \
                  `(require \"NAME\")`"
             } else {
-                "what follows is not compiled, since its names depend on this"
+                "the forms behind it are not compiled, since their names depend on this"
             };
             last.help.get_or_insert(help.into());
         }

@@ -349,7 +349,7 @@ fn circular(modules: &[String], span: Span) -> Box<Diagnostic> {
         [name] => format!("the module {name} requires itself"),
         names => format!("the module {} requires itself, by way of {}", names[0], names[1..].join(", ")),
     };
-    let help = "put what both need into a module of its own";
+    let help = "put the definitions that both need into a module of their own";
     Box::new(code::CIRCULAR_MODULE.at(span, message).help(help))
 }
 

@@ -54,7 +54,7 @@ fn canaries_change_with_the_epoch_only() {
         );
         return std::fs::write(&path, text).expect("the file can be written");
     }
-    // With another library or compiler, other turns are no wonder, and old records are refused anyway.
+    // With another library or compiler, other turns are expected, and old records are refused anyway.
     assert!(
         changed.is_empty() || head[0].1 != now,
         "the canaries of {} programs have changed ({}): records of runs do not replay. If that is meant, count \

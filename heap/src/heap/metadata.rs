@@ -103,7 +103,7 @@ pub(super) fn sweep(bytes: &mut [u8], epoch: u8, mut dead: impl FnMut(Range<usiz
             _ => {}
         }
         let byte = bytes[at];
-        debug_assert!(byte & GRAY == 0, "sweeping what is still to be followed");
+        debug_assert!(byte & GRAY == 0, "sweeping an object that the marking has not followed");
         if byte & EPOCH != epoch {
             bytes[at] = 0;
             at += 1;
@@ -204,7 +204,7 @@ mod tests {
             'a'..='c' => (c as u8 - b'a' + 1) | END,
             'g' => GRAY,
             '-' => BODY,
-            _ => unreachable!("{c} is no granule"),
+            _ => unreachable!("{c} is not a granule"),
         };
         text.chars().map(byte).collect()
     }

@@ -418,7 +418,7 @@ impl Host for ReplayHost {
                 return Vec::new();
             }
         }
-        self.next_plain::<Received>("what has come").map_or(Vec::new(), |answer| answer.0.1)
+        self.next_plain::<Received>("the arrivals").map_or(Vec::new(), |answer| answer.0.1)
     }
 
     fn check(&mut self, check: RunCheck) {

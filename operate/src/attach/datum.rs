@@ -13,7 +13,7 @@ const DEPTH: usize = 50;
 /// Returns what stands for the data of a text: as `sessions.esl` says, so that their symbols are not made.
 ///
 /// # Errors
-/// Why it is no data.
+/// Why it is not data.
 pub(crate) fn codes_of(text: &str) -> Result<Datum, OperatorRefusal> {
     let form = WireForm::parse(&format!("({text})"))
         .map_err(|reason| OperatorRefusal::NotData { text: text.into(), reason })?;

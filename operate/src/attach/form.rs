@@ -1,6 +1,6 @@
 //! Forms of the protocol of sessions: symbols, integers, strings and lists, as texts.
 //!
-//! They are no data of the program: their symbols are text here, so what a stranger sends makes none there.
+//! They are not data of the program: their symbols are text here, so what a stranger sends makes none there.
 //! Length and depth are bounded while a text is parsed, so parsing takes a time and a room in proportion to
 //! the bytes that have come.
 

@@ -19,7 +19,11 @@ pub(crate) fn understand(secrets: &Secrets, bytes: &[u8]) -> usize {
     let mut understood = usize::from(secrets.role_of(text.as_bytes()).is_some());
     while let Some(text) = taken(&mut rest, LARGEST) {
         let Ok(request) = WireForm::parse(&text) else { continue };
-        assert_eq!(WireForm::parse(&request.to_string()).as_ref(), Ok(&request), "what is written is read");
+        assert_eq!(
+            WireForm::parse(&request.to_string()).as_ref(),
+            Ok(&request),
+            "a written form is read back"
+        );
         let items = request.items().unwrap_or_default();
         let form = items.get(1).and_then(WireForm::items).unwrap_or_default();
         let name = form.first().and_then(WireForm::name).unwrap_or_default();

@@ -1,8 +1,8 @@
 //! Packets on their way to the peers of sessions.
 //!
 //! Guarantees: what a session writes waits in the program until there is room for it here, so the packets
-//! of a session take a bounded number of bytes however slowly its peer reads. What is written to a session
-//! that has ended is lost, and waits for nothing.
+//! of a session take a bounded number of bytes however slowly its peer reads. Output to a session that has
+//! ended is lost, and waits for nothing.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};

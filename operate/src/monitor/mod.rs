@@ -1,8 +1,8 @@
 //! The monitor: one page, which shows a run as it goes on.
 //!
-//! The page asks for nothing but itself and what this server sends. What it shows comes as server-sent
-//! events; what is done goes the other way as posts. The token is in the fragment of the address of the page,
-//! which no browser sends; the page puts it into its requests.
+//! The page asks for nothing but itself and what this server sends. The state of the run comes as server-sent
+//! events; commands go the other way as posts. The token is in the fragment of the address of the page, which
+//! no browser sends; the page puts it into its requests.
 //!
 //! Without viewers the run is not surveyed. Each survey covers a bounded number of tasks. A viewer that does
 //! not read its events is disconnected.

@@ -1,8 +1,8 @@
 //! Sessions of SLIME, the Lisp environment for Emacs: what its requests need and how they are answered.
 //!
-//! Most requests are functions of the library, in `stdlib/slime*.esl`. What stands here is the table of
-//! them, and the translation of arguments and answers: names from outside stay strings, so they make no
-//! symbols in the program.
+//! Most requests are functions of the library, in `stdlib/slime*.esl`. Here are the table of them, and the
+//! translation of arguments and answers: names from outside stay strings, so they make no symbols in the
+//! program.
 //!
 //! Guarantees: each request is answered, if only by a refusal; each says which role it needs.
 //!

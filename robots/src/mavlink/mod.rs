@@ -181,7 +181,7 @@ fn add_links(rows: &mut HostRows) {
     rows.at_once(
         "%MAVLINK-SIGN",
         ["link", "key", "number", "accepts-unsigned"],
-        "Has messages signed with KEY, a vector of 32 bytes or a phrase, and those of others checked.",
+        "Signs messages with KEY, a vector of 32 bytes or a phrase, and checks those of others.",
         |link: HostHandle<MavlinkLink>, key: Datum, number: u8, accepts_unsigned: bool| {
             let bytes = match key.kind() {
                 DatumKind::String(phrase) => Sha256::digest(phrase.as_bytes()).into(),
@@ -200,7 +200,7 @@ fn add_links(rows: &mut HostRows) {
     rows.at_once(
         "%MAVLINK-TARGET",
         ["link", "system", "component"],
-        "Has this component of this system be the vehicle of LINK.",
+        "Makes this component of this system the vehicle of LINK.",
         |link: HostHandle<MavlinkLink>, system: u8, component: u8| {
             link.0.set_target((system, component));
             Ok(())
@@ -209,7 +209,7 @@ fn add_links(rows: &mut HostRows) {
     rows.at_once(
         "%MAVLINK-COUNTS",
         ["link"],
-        "Returns the numbers of what has happened: a property list.",
+        "Returns the counters of LINK: a property list.",
         |link: HostHandle<MavlinkLink>| Ok(link.0.counts()),
     );
 }
@@ -237,7 +237,7 @@ fn add_messages(rows: &mut HostRows) {
     rows.at_once(
         "%MAVLINK-SUBSCRIBE",
         ["link", "input", "names", "system", "component"],
-        "Has the input signalled with messages, their keywords, and the system and component of their senders.",
+        "Signals the input with messages, their keywords, and the system and component of their senders.",
         move |link: HostHandle<MavlinkLink>,
               input: HostInput,
               names: Datum,

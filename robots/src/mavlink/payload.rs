@@ -237,7 +237,7 @@ fn write_element(element: FieldType, datum: &Datum, bytes: &mut [u8]) -> Result<
         return Ok(());
     }
     if element.is_float() {
-        // NIL is no value.
+        // NIL is not a value.
         let number = if datum.is_nil() { Some(f64::NAN) } else { number_of(datum) };
         let fits = |number: &f64| {
             element == FieldType::Double || !number.is_finite() || (*number as f32).is_finite()

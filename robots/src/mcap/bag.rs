@@ -22,7 +22,7 @@ impl McapBag {
     /// Opens a file, or the folder of a bag of rosbag2.
     ///
     /// # Errors
-    /// A file cannot be read at all; the text names it. Damaged parts are no error: [`McapBag::damage`]
+    /// A file cannot be read at all; the text names it. Damaged parts are not an error: [`McapBag::damage`]
     /// returns them.
     pub fn open(path: &Path) -> Result<McapBag, McapFault> {
         let paths = if path.is_dir() { files_of_folder(path)? } else { vec![path.to_owned()] };

@@ -214,5 +214,5 @@ fn what_it_is(beginning: &[u8]) -> String {
         }
         _ => format!("it begins with \"{}\"", beginning.escape_ascii()),
     };
-    format!("not a file of MCAP: {is}")
+    format!("not an MCAP file: {is}")
 }

@@ -1,6 +1,6 @@
 //! The index of a file without a summary, or with a broken one: it is read from its beginning to its end.
 //!
-//! Guarantees: a chunk or a record that cannot be read ends nothing but itself. Behind bytes that are no
+//! Guarantees: a chunk or a record that cannot be read ends nothing but itself. Behind bytes that are not a
 //! record, the scan goes on with the next chunk or message. Each part that is passed over is noted as damage.
 
 use std::io::{Read, Seek};

@@ -161,7 +161,7 @@ fn behind_bytes_that_are_no_record_reading_goes_on() {
 #[test]
 fn what_is_not_of_mcap_is_named() {
     let fault = |bytes: &[u8]| McapFile::of(Cursor::new(bytes.to_vec())).err().map(|fault| fault.to_string());
-    let expected = |is: &str| Some(format!("not a file of MCAP: {is}"));
+    let expected = |is: &str| Some(format!("not an MCAP file: {is}"));
     assert_eq!(fault(b""), expected("it is empty"));
     assert_eq!(fault(b"\x89MC"), expected("it ends within its first bytes"));
     assert_eq!(fault(b"hello, world"), expected("it begins with \"hello, w\""));

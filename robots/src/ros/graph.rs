@@ -141,8 +141,8 @@ impl NodeGraph {
             event("TYPE-MISMATCH", text)
         } else if our_hash != their_hash {
             let text = format!(
-                "{there} has another version of {our_type}: {their_hash} where this node has {our_hash}; the two do \
-                 not hear each other"
+                "{there} has another version of {our_type}: {their_hash} where this node has {our_hash}; \
+                 their messages do not reach each other"
             );
             event("TYPE-MISMATCH", text)
         } else {

@@ -1,8 +1,8 @@
 //! ROS 2 by Zenoh, in the manner of `rmw_zenoh`: nodes with topics and services. Actions, parameters and the
 //! rest are made of these in ESL, in `modules/ros.esl`.
 //!
-//! Guarantees: no payload stops a node or its program. What cannot be read is counted, told once for each
-//! sender, and dropped; a type, a quality of service or a name that does not fit is told by its name.
+//! Guarantees: no payload stops a node or its program. An unreadable payload is counted, reported once for
+//! each sender, and dropped; a type, a quality of service or a name that does not fit is told by its name.
 
 use std::path::PathBuf;
 
@@ -50,7 +50,7 @@ fn add_types(rows: &mut HostRows, types: &Types) {
     rows.at_once(
         "%ROS-FOLDER",
         ["path"],
-        "Has definitions be looked for in the folder PATH first.",
+        "Adds the folder PATH to the search for definitions, before others.",
         move |path: String| {
             known.add_folder(PathBuf::from(path));
             Ok(())
@@ -61,7 +61,7 @@ fn add_types(rows: &mut HostRows, types: &Types) {
     rows.at_once(
         "%ROS-DEFINE",
         ["name", "text"],
-        "Has TEXT be the definition of the type NAME.",
+        "Makes TEXT the definition of the type NAME.",
         move |name: String, text: String| Ok(known.define(&name, &text)?),
     )
     .everywhere();
@@ -231,7 +231,7 @@ fn add_topics(rows: &mut HostRows, types: &Types) {
         spawned,
         "%ROS-SUBSCRIBE",
         ["node", "input", "name", "type", "qos"],
-        "Has the input signalled with the messages of a topic, and the times at which they were sent.",
+        "Signals the input with the messages of a topic, and the times at which they were sent.",
         move |node: HostHandle<RosNode>,
               input: HostInput,
               name: String,
@@ -259,7 +259,7 @@ fn add_clock(rows: &mut HostRows, types: &Types, inbox: &Inbox) {
         spawned,
         "%ROS-CLOCK",
         ["node", "input", "qos"],
-        "Has time be that of the topic /clock. The input is signalled with its beginning and with steps back.",
+        "Makes the topic /clock the source of time. Signals the input with its beginning and with steps back.",
         move |node: HostHandle<RosNode>, input: HostInput, QosArgument(qos): QosArgument| {
             made += 1;
             let (number, of_type) = (made, types::message(&known, "rosgraph_msgs/msg/Clock"));
@@ -300,7 +300,7 @@ fn add_services(rows: &mut HostRows, types: &Types) {
         spawned,
         "%ROS-SERVE",
         ["node", "input", "name", "type", "qos"],
-        "Has the input signalled with the calls of a service: of each its handle and the request.",
+        "Signals the input with the calls of a service: of each its handle and the request.",
         move |node: HostHandle<RosNode>,
               input: HostInput,
               name: String,

@@ -32,7 +32,7 @@ impl fmt::Display for LiveFault {
         match self {
             LiveFault::Exposed(address) => write!(
                 f,
-                "others could hear what is said at {address}: use a port of 127.0.0.1, which others reach by \
+                "others could read the traffic at {address}: use a port of 127.0.0.1, which others reach by \
                  ssh -L {}:127.0.0.1:{}",
                 address.port(),
                 address.port()

@@ -92,7 +92,7 @@ impl InputDelivery {
         self.lost.load(Ordering::Relaxed)
     }
 
-    /// Ends it. What is kept is dropped.
+    /// Ends it, and drops the arrivals that it keeps.
     pub(crate) fn end(&self) {
         let mut kept = self.kept();
         kept.has_ended = true;

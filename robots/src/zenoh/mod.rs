@@ -131,7 +131,7 @@ fn add_sessions(rows: &mut HostRows) {
     rows.at_once(
         "%ZENOH-SCOUT",
         ["session", "address"],
-        "Has peers be found by multicast at ADDRESS.",
+        "Finds peers by multicast at ADDRESS.",
         |session: HostHandle<ZenohSession>, address: String| {
             session.configure(|config| config.scout(&address))
         },
@@ -152,7 +152,7 @@ fn add_sessions(rows: &mut HostRows) {
         spawned,
         "%ZENOH-CLOSE",
         ["session"],
-        "Closes SESSION, when what was asked for before is handed over.",
+        "Closes SESSION, when earlier requests are handed over.",
         |session: HostHandle<ZenohSession>| async move { session.close().await },
     );
     rows.at_once(
@@ -209,7 +209,7 @@ fn add_entities(rows: &mut HostRows) {
         spawned,
         "%ZENOH-SUBSCRIBE",
         ["session", "input", "key", "form"],
-        "Has the input signalled with key, payload, attachment, encoding and kind of what is put under KEY.",
+        "Signals the input with key, payload, attachment, encoding and kind of each change under KEY.",
         {
             let next = next.clone();
             move |session: HostHandle<ZenohSession>, input: HostInput, key: String, form: PayloadForm| {
@@ -225,7 +225,7 @@ fn add_entities(rows: &mut HostRows) {
         spawned,
         "%ZENOH-SERVE",
         ["session", "input", "key", "form"],
-        "Has the input signalled with queries for KEY: handle, key, parameters, payload, attachment, encoding.",
+        "Signals the input with queries for KEY: handle, key, parameters, payload, attachment, encoding.",
         {
             let next = next.clone();
             move |session: HostHandle<ZenohSession>, input: HostInput, key: String, form: PayloadForm| {
@@ -251,7 +251,7 @@ fn add_entities(rows: &mut HostRows) {
         spawned,
         "%ZENOH-WATCH",
         ["session", "input", "key"],
-        "Has the input signalled with :PUT or :DELETE and the key of signs of life that come or go.",
+        "Signals the input with :PUT or :DELETE and the key of signs of life that come or go.",
         move |session: HostHandle<ZenohSession>, input: HostInput, key: String| {
             let number = next();
             async move {
@@ -263,7 +263,7 @@ fn add_entities(rows: &mut HostRows) {
     rows.at_once(
         "%ZENOH-END",
         ["entity"],
-        "Ends what was declared.",
+        "Ends ENTITY, a declaration.",
         |entity: HostHandle<DeclaredEntity>| {
             entity.end();
             Ok(())
@@ -330,7 +330,7 @@ fn add_queries(rows: &mut HostRows) {
     rows.at_once(
         "%ZENOH-FINISH",
         ["query"],
-        "Has QUERY have no further replies.",
+        "Ends the replies to QUERY.",
         |query: HostHandle<PendingQuery>| {
             query.finish();
             Ok(())

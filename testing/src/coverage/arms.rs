@@ -11,7 +11,7 @@ pub(super) struct WrittenConditional {
     pub(super) operator: String,
     /// Its arms that have forms, in order.
     pub(super) arms: Vec<WrittenArm>,
-    /// Whether that none is chosen is no choice of the form.
+    /// Whether it always chooses one of its arms.
     pub(super) always_chooses: bool,
 }
 

@@ -50,7 +50,7 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Creates the coverage of a program that was compiled to be counted. What its macros have run counts.
+    /// Creates the coverage of a program that was compiled to be counted. Passages of its macros count.
     pub fn new(compiled: &Compiled) -> Coverage {
         let counts = vec![0; compiled.places.len()];
         let (sources, places) = (compiled.sources.clone(), compiled.places.clone());

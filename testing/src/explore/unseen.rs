@@ -63,7 +63,7 @@ impl fmt::Display for UnseenKind {
             UnseenKind::Pair => "changes of pairs",
             UnseenKind::Table => "changes of hash tables",
             UnseenKind::Property => "changes of properties of symbols",
-            UnseenKind::Code => "what code does that is made at run time",
+            UnseenKind::Code => "effects of code that is made at run time",
             UnseenKind::LateDefinition => "definitions while tasks run",
             UnseenKind::Definition => "changes of functions, classes and packages",
         })

@@ -55,7 +55,7 @@ impl ExplorationScope {
         self.unseen.is_empty() && self.limit.is_none()
     }
 
-    /// Says why the exploration is no proof; `None` if it is complete.
+    /// Says why the exploration is not a proof; `None` if it is complete.
     pub fn why_not_complete(&self) -> Option<String> {
         let limit = match self.limit {
             Some(SearchLimit::States) => "the limit of states is reached",

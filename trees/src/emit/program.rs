@@ -69,7 +69,7 @@ impl Emitter<'_> {
             let form = self.forms.call("define-fluent", 3, parts);
             self.forms.print(form, &mut text);
         }
-        self.print_section("leaves: what the robot does, to be filled in", &definitions, &mut text);
+        self.print_section("leaves: the actions and checks of the robot, empty", &definitions, &mut text);
         self.print_section("the tree", &functions, &mut text);
         let main = self.instances.first().map(|instance| instance.function.clone()).unwrap_or_default();
         let mut call = self.forms.atoms(&[&main]);

@@ -346,9 +346,9 @@ impl Builder {
                     return;
                 }
                 None if ids.is_empty() => {
-                    format!("there is not a tree `{id}`: expected a `<BehaviorTree ID=\"{id}\">`")
+                    format!("no tree is called `{id}`: expected a `<BehaviorTree ID=\"{id}\">`")
                 }
-                None => format!("there is not a tree `{id}`: {expected}"),
+                None => format!("no tree is called `{id}`: {expected}"),
             },
             None if ids.len() == 1 => return,
             None if ids.is_empty() => "the file has no trees: expected a `<BehaviorTree>`".into(),

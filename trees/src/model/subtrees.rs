@@ -15,7 +15,7 @@ impl Builder {
             let (id, place, file) = (node.id.clone(), node.place, self.model.trees[node.tree].file);
             if self.model.tree(&id).is_none() {
                 let ids: Vec<&str> = self.model.trees.iter().map(|tree| &*tree.id).collect();
-                let text = format!("there is not a tree `{id}`: expected one of `{}`", ids.join("`, `"));
+                let text = format!("no tree is called `{id}`: expected one of `{}`", ids.join("`, `"));
                 self.fault(file, place, text);
                 continue;
             }

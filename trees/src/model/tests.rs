@@ -64,7 +64,7 @@ fn ports_are_checked() {
     );
     assert_eq!(
         of_root("<A _skipIf='x ='/>"),
-        "t.xml:2:4: the script `x =` cannot be read: the script ends: expected a value"
+        "t.xml:2:4: the script `x =` cannot be read: expected a value, found the end of the script"
     );
 }
 
@@ -76,7 +76,7 @@ fn trees_are_found_and_do_not_contain_themselves() {
                ID='C'/></BehaviorTree></root>";
     let told = faults(two);
     assert!(told.contains("the main tree is not named: expected one of `A`, `B`"), "{told}");
-    assert!(told.contains("there is not a tree `C`: expected one of `A`, `B`"), "{told}");
+    assert!(told.contains("no tree is called `C`: expected one of `A`, `B`"), "{told}");
     let cycle = "<root BTCPP_format='4' main_tree_to_execute='A'>\n<BehaviorTree ID='A'><SubTree ID='B'/>\
                  </BehaviorTree>\n<BehaviorTree ID='B'><SubTree ID='A'/></BehaviorTree></root>";
     assert_eq!(

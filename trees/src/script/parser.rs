@@ -76,9 +76,8 @@ impl ScriptParser {
         if self.takes(operator) {
             return Ok(());
         }
-        let found =
-            self.peek().map_or("the script ends".into(), |token| format!("{} is there", shown(token)));
-        Err(format!("{found}: expected `{operator}`").into())
+        let found = self.peek().map_or("the end of the script".into(), shown);
+        Err(format!("expected `{operator}`, found {found}").into())
     }
 
     fn push(&mut self, expression: Expression) -> usize {
@@ -112,7 +111,7 @@ impl ScriptParser {
 
     fn prefix(&mut self, depth: usize) -> Result<usize, ScriptFault> {
         let Some(token) = self.peek().cloned() else {
-            return Err("the script ends: expected a value".to_owned().into());
+            return Err("expected a value, found the end of the script".to_owned().into());
         };
         self.at += 1;
         Ok(match token {
@@ -130,7 +129,7 @@ impl ScriptParser {
                 self.push(Expression::Unary(operator, operand))
             }
             token @ ScriptToken::Operator(_) => {
-                return Err(format!("{} is there: expected a value", shown(&token)).into());
+                return Err(format!("expected a value, found {}", shown(&token)).into());
             }
         })
     }
@@ -219,16 +218,16 @@ mod tests {
         assert_eq!(shape("m := 'a' .. 1.50 .. true"), "(m:=(('a'..1.5)..true))");
         // A semicolon between statements may be missing.
         assert_eq!(shape("A := 1 B := 2"), "(A:=1);(B:=2)");
-        assert_eq!(shape(";;"), "`;` is there: expected a value");
+        assert_eq!(shape(";;"), "expected a value, found `;`");
         assert_eq!(shape(""), "");
     }
 
     #[test]
     fn faults_say_what_was_expected() {
-        assert_eq!(shape("a == "), "the script ends: expected a value");
-        assert_eq!(shape("(a"), "the script ends: expected `)`");
+        assert_eq!(shape("a == "), "expected a value, found the end of the script");
+        assert_eq!(shape("(a"), "expected `)`, found the end of the script");
         assert_eq!(shape("1 := 2"), "`:=` sets an entry of the blackboard: expected its name before it");
-        assert_eq!(shape("a )"), "`)` is there: expected a value");
+        assert_eq!(shape("a )"), "expected a value, found `)`");
         assert_eq!(shape("a := 'b"), "the text 'b has no end: expected a second `'`");
         assert_eq!(shape("a # b"), "`#` is not part of the language of scripts");
         assert!(shape("a := 1.").starts_with("`1.` is not a number"));

@@ -145,7 +145,7 @@ pub(super) fn aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn set_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [array, subscripts @ .., value] = arguments else {
-        return vm.exchange.program_error("a value and subscripts are expected");
+        return vm.exchange.program_error("expected a value and subscripts");
     };
     let index = row_major_index(vm, *array, subscripts)?;
     set_element(vm, *array, index, *value)

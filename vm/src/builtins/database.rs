@@ -1,4 +1,4 @@
-//! The logical database: changes of facts, and queries in steps. Whatever calls functions of the program is
+//! The logical database: changes of facts, and queries in steps. Code that calls functions of the program is
 //! ESL, in `stdlib/database.esl`.
 
 use esl_database::{Database, Effort, FormulaError, Progress, QueryError};

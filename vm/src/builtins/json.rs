@@ -88,7 +88,7 @@ fn extent(text: &[u32]) -> Option<usize> {
             QUOTE => {
                 at += 1;
                 while at < end && text[at] != QUOTE {
-                    // Whatever is escaped does not end the string.
+                    // An escaped character does not end the string.
                     at += if text[at] == BACKSLASH { 2 } else { 1 };
                 }
                 if at >= end {
@@ -462,7 +462,7 @@ pub(super) fn write_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             0x0A => add(&mut escaped, "\\n"),
             0x0D => add(&mut escaped, "\\r"),
             0x09 => add(&mut escaped, "\\t"),
-            // Control characters, and what is no character to others.
+            // Control characters, and codes that are not characters to others.
             0..0x20 | 0x7F | 0xD800..=0xDFFF => add(&mut escaped, &format!("\\u{code:04x}")),
             code => escaped.push(code),
         }

@@ -18,7 +18,7 @@ use super::expect::exactly;
 /// Returns a function of the host, if there is one, and its arguments, from a symbol and a list.
 ///
 /// # Errors
-/// A failure if an argument is no data, or if the program does not have a right that the function needs.
+/// A failure if an argument is not data, or if the program does not have a right that the function needs.
 pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(Option<GivenIndex>, Vec<Datum>), Exit> {
     let (name, arguments) = (call[0], call[1]);
     let function = function_named(vm, name);

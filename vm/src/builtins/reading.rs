@@ -86,7 +86,7 @@ fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<FirstRead>, 
 
 /// The first datum or fault of a text.
 struct FirstRead {
-    /// Whether there is a datum, the object, and the calls in it; or what is no datum.
+    /// Whether there is a datum, the object, and the calls in it; or the fault.
     values: Result<[Value; 3], ReadFault>,
     /// Number of characters up to its end.
     characters: usize,

@@ -269,7 +269,7 @@ impl Walk<'_> {
         self.word(u64::from(number) << TAG_MASK.count_ones() | v.bits() & TAG_MASK);
     }
 
-    /// Something that is no value, in the place of one: a word of which nothing else begins there.
+    /// Something that is not a value, in the place of one: a word of which nothing else begins there.
     pub(super) fn no_value(&mut self) {
         // No object has this number.
         self.word(u64::MAX << TAG_MASK.count_ones() | TAG_OBJECT);

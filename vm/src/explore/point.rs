@@ -248,8 +248,8 @@ impl PointRun {
         }
     }
 
-    /// Returns the task that ran last if it stands at a tick that is no point: if others have seen nothing of
-    /// it since its last point, giving way here would be as giving way there.
+    /// Returns the task that ran last if it stands at a tick that is not a point: if others have seen nothing
+    /// of it since its last point, giving way here would be as giving way there.
     fn goes_on_unseen(&mut self, vm: &mut Vm) -> Option<TaskIndex> {
         let way = self.unseen.as_mut()?;
         let symbols = vm.names.symbol_count();

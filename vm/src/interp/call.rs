@@ -243,7 +243,7 @@ pub(super) unsafe fn call_instead(
 ) -> Signal {
     match exit {
         Exit::Slowly => match vm.twin_of(&BUILTINS[usize::from(number)]) {
-            // SAFETY: the contract still holds. A twin is no builtin, so this goes one level deep.
+            // SAFETY: the contract still holds. A twin is not a builtin, so this goes one level deep.
             Ok(function) => unsafe { call(vm, function, arguments, place) },
             Err(exit) => Signal::Exit(exit),
         },

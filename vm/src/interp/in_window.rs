@@ -1,8 +1,8 @@
 //! The fast path of calls of functions with optional, rest and key parameters: the arguments are put in the
 //! order of the parameters in the window of the call, where they are the first registers of the new frame.
 //!
-//! Whatever is unusual (wrong numbers of arguments, unknown keys, many arguments, lack of room) is left to
-//! [`super::arguments`], which also says what is wrong; nothing has changed then.
+//! An unusual call (wrong numbers of arguments, unknown keys, many arguments, lack of room) is left to
+//! [`super::arguments`], which also reports the fault; nothing has changed then.
 
 use super::constants_of;
 use crate::heap::layout::CodeObject;

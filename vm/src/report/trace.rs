@@ -69,7 +69,7 @@ fn write_trace(vm: &mut Vm, index: TaskIndex, happening: Happening) {
         Happening::Begins => "begins".into(),
         Happening::Waits => format!("waits for {}", reason_of(vm, task)),
         Happening::GoesOn => "goes on".into(),
-        Happening::IsToEnd => "is to be aborted".into(),
+        Happening::IsToEnd => "abort requested".into(),
     };
     write_trace_line(vm, &label, &what);
 }

@@ -65,6 +65,6 @@ fn report_cut_off(vm: &mut Vm) {
         return;
     }
     let name = report::task_label(vm, object);
-    let all = if is_last { ", and so will those further out be that do not end at once" } else { "" };
+    let all = if is_last { ", and so are outer ones that do not end at once" } else { "" };
     vm.outside.complain(&format!("A cleanup of {name} takes too long and is cut off{all}.\n"));
 }

@@ -12,7 +12,7 @@ use crate::task::{DEFAULT_PRIORITY, HIGHEST_PRIORITY, Task, TaskEnd, TaskId, Tas
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// Beginning of the names of the library's own functions. A call of one is no task of the program.
+/// Beginning of the names of the library's own functions. A call of one is not a task of the program.
 const LIBRARY: &str = "ESL::%";
 /// Most tasks that an answer names.
 const SHOWN: usize = 10_000;

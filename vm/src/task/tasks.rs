@@ -41,7 +41,7 @@ pub(crate) struct Tasks {
     standstills: Vec<Standstill>,
     free: Vec<u32>,
     /// Records of tasks that have ended, to be used again.
-    #[allow(clippy::vec_box, reason = "the boxes are what is kept: they go into places as they are")]
+    #[allow(clippy::vec_box, reason = "the boxes are kept, since they go into places as they are")]
     spare: Vec<Box<Task>>,
     /// Number of places, from the first on, that the collector has yet to look at.
     unmet: usize,

@@ -1,9 +1,9 @@
 //! Files that are read and written in parts, of which each makes only the calling task wait.
 //!
 //! FIFOs, terminals and other devices are read and written when the system says that they are ready; regular
-//! files, and devices about which the system says nothing, by threads that may be delayed. What was read is
-//! kept here until the program takes it, so nothing is lost when a call is left at the moment at which its
-//! data come.
+//! files, and devices about which the system says nothing, by threads that may be delayed. Input is buffered
+//! here until the program takes it, so nothing is lost when a call is left at the moment at which its data
+//! come.
 //!
 //! A regular file that is written is opened for each part, by the path that was permitted, so that a stream
 //! left open takes no descriptor; one that is read as text is closed at its end.
@@ -85,7 +85,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         spawned,
         "%FILE-OPEN-INPUT",
         ["file", "path", "as-text"],
-        "Has FILE be the file PATH, to be read. Returns whether it is a regular file.",
+        "Opens the file PATH for reading as FILE. Returns whether it is a regular file.",
         open_input,
     )
     .needs(Right::Read, "path");
@@ -101,7 +101,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         spawned,
         "%FILE-OPEN-OUTPUT",
         ["file", "path", "mode"],
-        "Has FILE be the file PATH, to be written: MODE 0 replaces it, 1 appends to it, 2 fails if there is one, 3 \
+        "Opens the file PATH for writing as FILE: MODE 0 replaces it, 1 appends to it, 2 fails if there is one, 3 \
          writes over it from its beginning.",
         open_output,
     )
@@ -175,7 +175,7 @@ fn add_requests(rows: &mut HostRows) {
         spawned,
         "%FILE-LIST",
         ["path"],
-        "Returns the names of what is in the folder PATH.",
+        "Returns the names of the entries of the folder PATH.",
         |path: String| async move { requested(move || request_of_files(FileRequest::List(&path))).await },
     )
     .needs(Right::Read, "path");
@@ -243,7 +243,7 @@ fn add_immediate(rows: &mut HostRows) {
     rows.at_once(
         "%FILE-TAKE",
         ["file", "as-text"],
-        "Takes what has been read, a text or bytes; NIL at the end.",
+        "Takes the buffered input, a text or bytes; NIL at the end.",
         |file: HostHandle<FileSlot>, as_text: bool| Ok(file.get()?.take(as_text)),
     );
     rows.at_once(
@@ -280,7 +280,7 @@ fn polled(file: &File, interest: tokio::io::Interest) -> Option<FileAccess> {
     // The system refuses what is always ready.
     #[allow(
         deprecated,
-        reason = "what its successor has to be promised, a `File` keeps: one open descriptor"
+        reason = "the successor needs the promise of one open descriptor, which a `File` keeps"
     )]
     let registered = tokio::io::unix::AsyncFd::with_interest(file.try_clone().ok()?, interest);
     registered.ok().map(FileAccess::Polled)

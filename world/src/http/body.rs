@@ -33,7 +33,7 @@ pub(super) async fn receive(
             Ok(Some(Err(error))) => {
                 return Err((StatusCode::BAD_REQUEST, format!("the body is invalid: {}", innermost(&error))));
             }
-            Err(_) => return Err((StatusCode::REQUEST_TIMEOUT, "the body does not come".into())),
+            Err(_) => return Err((StatusCode::REQUEST_TIMEOUT, "the body has not arrived in time".into())),
         };
         // Trailers are not for the program.
         let Ok(data) = frame.into_data() else { continue };

@@ -209,8 +209,8 @@ fn body_of(given: GivenBody) -> (RequestBody, Option<Sender<Bytes>>) {
     }
 }
 
-/// Returns a request. What it says about its connection and its body is said here, unless the program says
-/// it.
+/// Returns a request. Its headers about the connection and the body are set here, unless the program sets
+/// them.
 pub(crate) fn request(
     method: &str,
     url: &Url,
@@ -367,7 +367,7 @@ async fn answer(exchange: Arc<HttpExchange>) -> Result<(u16, Vec<(String, String
 async fn read(exchange: Arc<HttpExchange>, as_bytes: bool) -> Result<Datum, HostFailure> {
     let mut answer = exchange.answer.lock().await;
     let AnswerProgress::Body(body) = &mut *answer else {
-        return Err(http_failure("the answer has yet to come"));
+        return Err(http_failure("the answer has not arrived yet"));
     };
     loop {
         let piece =

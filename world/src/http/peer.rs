@@ -102,7 +102,7 @@ impl Peer {
                 }
             }
         }
-        // The client does not read. What it is sent takes memory meanwhile.
+        // The client does not read. Unsent data take memory meanwhile.
         let stalled = self.stalled.get_or_insert_with(|| Box::pin(tokio::time::sleep(STALL)));
         stalled.as_mut().poll(context).map(|()| Err(ErrorKind::TimedOut.into()))
     }

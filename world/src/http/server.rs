@@ -126,7 +126,7 @@ pub(super) fn add(rows: &mut HostRows) {
         spawned,
         "%HTTP-LISTEN",
         ["server", "input", "address", "most", "certificate", "key"],
-        "Has SERVER listen at ADDRESS, for at MOST so many connections from one address; by TLS, if there are files of \
+        "Makes SERVER listen at ADDRESS, for at MOST so many connections from one address; by TLS, if there are files of \
          CERTIFICATE and KEY. Returns the port. The input with the name INPUT is signalled with each request: its \
          number, method, path, the parts of that, query, headers, body, a text if it is UTF-8, and bytes otherwise, \
          and whether it begins a connection of WebSocket; and with the number alone when the client of one has gone.",

@@ -203,7 +203,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         spawned,
         "%MQTT-SUBSCRIBE",
         ["client", "input", "filter", "qos", "as-bytes"],
-        "Has the input with the name INPUT signalled with topic, payload and retention of messages for FILTER.",
+        "Signals the input with the name INPUT with topic, payload and retention of messages for FILTER.",
         subscribe,
     );
     rows.at_once(

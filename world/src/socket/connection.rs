@@ -66,7 +66,7 @@ impl Writer {
         Ok(self.unsent.is_empty() && Pin::new(&mut *self.stream).poll_flush(&mut context)?.is_ready())
     }
 
-    /// Writes what is unsent, and then these bytes. What is unsent stays so if this is left.
+    /// Writes the unsent bytes, and then these. Unsent bytes stay so if this is left.
     async fn write(&mut self, bytes: &[u8]) -> Result<(), Error> {
         while !self.unsent.is_empty() {
             match self.stream.write(&self.unsent).await? {

@@ -92,8 +92,8 @@ fn bind_to(address: std::net::SocketAddr) -> std::io::Result<TcpListener> {
     socket.listen(BACKLOG)
 }
 
-/// Returns whether an error is no fault of a listener: the peer has gone already, or there is no descriptor
-/// or memory for one more, until some are released.
+/// Returns whether an error is not a fault of a listener: the peer has gone already, or there is no
+/// descriptor or memory for one more, until some are released.
 fn is_passing(error: &Error) -> bool {
     #[cfg(unix)]
     if let Some(error) = rustix::io::Errno::from_io_error(error) {

@@ -127,7 +127,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         spawned,
         "%WATCH-OPEN",
         ["watch", "input", "path"],
-        "Has the input with the name INPUT signalled with the changes of PATH: a keyword and a path. Returns NIL and \
+        "Signals the input with the name INPUT with the changes of PATH: a keyword and a path. Returns NIL and \
          the reason if the system does not watch it.",
         |sender: Sender, watch: HostHandle<WatchSlot>, input: HostInput, path: String| async move {
             let failed = |reason: &dyn ToString| HostFailure::new("SIMPLE-ERROR", reason.to_string());

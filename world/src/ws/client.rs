@@ -40,7 +40,7 @@ pub(super) fn http_url(url: &str) -> Result<Vec<String>, HostFailure> {
     };
     let url = http::parse_url(&rest, None).map_err(of_program)?;
     if url.fragment().is_some() {
-        return Err(ws_failure("the URL of a connection has no part behind `#`"));
+        return Err(ws_failure("the URL of a connection cannot have a part behind `#`"));
     }
     Ok(vec![url.to_string(), http::address(&url)])
 }

@@ -423,7 +423,7 @@ fn v14_variables_are_where_they_are_said_to_be() {
     check_code(calls, &[(register(2), 1, after)], Ok(()));
     check_code(calls, &[(register(2), after, after + 1)], Ok(()));
     check_code(calls, &[(register(3), after, after + 1)], Err(Fault::Variable(3)));
-    // Boxes are looked into, and the marker of a parameter without an argument is no value.
+    // Boxes are looked into, and the marker of a parameter without an argument is not a value.
     let boxed = "load-true r0 \n make-box r1 r0 \n return r0";
     check_code(boxed, &[(register(1), 2, 3)], Ok(()));
     let optional = "jump-if-supplied r0 L1 \n load-nil r0.. 1 \n L1: return r0";

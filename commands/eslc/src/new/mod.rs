@@ -7,7 +7,7 @@ use std::path::Path;
 
 use esl_command::{SUCCESS, USAGE, complain};
 
-/// The files: names and texts. `NAME` in a text that is no program stands for the name of the project.
+/// The files: names and texts. `NAME` in a text that is not a program stands for the name of the project.
 const FILES: [(&str, &str); 8] = [
     ("main.esl", include_str!("template/main.esl")),
     ("plan.esl", include_str!("template/plan.esl")),

@@ -1,9 +1,9 @@
 //! Profiles: where a run spends its ticks and its time, by task, calls and line.
 //!
-//! The run is divided into portions of a prime number of ticks, which changes nothing in it. What a task has
-//! used since its last sample counts for the calls in which it stands when a portion ends in
-//! its turn. So the sums are exact, those of tasks too, and other parts the more so the larger they are. A
-//! task that ends before a portion has ended in its turn has no calls.
+//! The run is divided into portions of a prime number of ticks, which changes nothing in it. The ticks of a
+//! task since its last sample count for the calls in which it stands when a portion ends in its turn. So
+//! totals, including per-task totals, are exact; other figures are estimates that improve with size. A task
+//! that ends before a portion has ended in its turn has no calls.
 //!
 //! Time is that of the tasks' turns, by the host's stopwatch: waiting takes none.
 //!

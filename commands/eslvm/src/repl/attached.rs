@@ -39,7 +39,11 @@ const COMMANDS: &[SessionCommand] = &[
     row(&[":failures"], "", "the latest failures of the run"),
     row(&[":facts"], "[NAME [N]]", "facts of the database, 500 at a time, after the first N"),
     row(&[":data"], "", "relations, locks of properties, and inputs"),
-    row(&[":watch"], "FORM", "writes the value of a form, and again after each change of what it reads"),
+    row(
+        &[":watch"],
+        "FORM",
+        "writes the value of a form, and again after each change of a source that it reads",
+    ),
     row(&[":abort"], "N", "aborts task N"),
     row(&[":suspend"], "N", "suspends task N and the tasks that it has made"),
     row(&[":resume"], "N", "resumes task N and the tasks that it has made"),
@@ -48,7 +52,7 @@ const COMMANDS: &[SessionCommand] = &[
     row(&[":signal"], "NAME DATA…", "signals an input, or the event that a variable holds"),
     row(&[":patch"], "FILE", "makes the definitions of a file in one step, or none of them"),
     row(&[":undo-patch"], "", "undoes the newest patch"),
-    row(&[":help"], "", "this list; (help 'name) says what a name means"),
+    row(&[":help"], "", "this list; (help 'name) describes a name"),
     row(&[":quit", ":exit"], "", "ends this session, as Ctrl-D does; the run goes on"),
 ];
 

@@ -76,13 +76,13 @@ const COMMANDS: &[SessionCommand] = &[
     SessionCommand {
         names: &[":tasks"],
         arguments: "",
-        does: "shows the tasks, their makers and what they wait for",
+        does: "shows the tasks, their makers and their waits",
     },
     SessionCommand { names: &[":abort"], arguments: "N", does: "aborts the task with the number N" },
     SessionCommand {
         names: &[":help"],
         arguments: "",
-        does: "shows this list; (help 'name) says what a name means",
+        does: "shows this list; (help 'name) describes a name",
     },
     SessionCommand { names: &[":quit", ":exit"], arguments: "", does: "ends the session, as Ctrl-D does" },
 ];

@@ -48,7 +48,7 @@ impl fmt::Display for AttachError {
 pub(super) enum RequestRefusal {
     /// The run says so, in these words.
     ByRun(String),
-    /// The run has answered something that is no answer.
+    /// The run has answered something that is not an answer.
     NotAnAnswer,
     /// The command needs something.
     Needs(String, &'static str),

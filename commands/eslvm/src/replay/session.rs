@@ -24,7 +24,7 @@ const COMMANDS: &[SessionCommand] = &[
     row(&["reverse-continue", "rc"], "", "goes back to the last breakpoint, or the beginning"),
     row(&["break"], "[WHAT]", "stops at failure, failure:CAUSE, task:NAME, fact:PATTERN or function:NAME"),
     row(&["where"], "", "says where the replay stands"),
-    row(&["tasks"], "", "shows the tasks, and what they wait for"),
+    row(&["tasks"], "", "shows the tasks and their waits"),
     row(&["bt"], "[TASK]", "shows the frames of a task, by its name or number"),
     row(&["facts"], "QUERY", "shows the answers to a query: facts (door ?name open)"),
     row(&["print", "p"], "FORM", "shows the values of a form, evaluated in a copy"),

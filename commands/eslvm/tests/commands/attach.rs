@@ -428,7 +428,7 @@ fn bad_options_are_refused() {
     use std::os::unix::fs::PermissionsExt;
     std::fs::set_permissions(&open, std::fs::Permissions::from_mode(0o644)).expect("it can be set");
     for (options, said) in [
-        (&["--listen", "0.0.0.0:0"][..], "eslvm: others could hear what is said at 0.0.0.0:0"),
+        (&["--listen", "0.0.0.0:0"][..], "eslvm: others could read the traffic at 0.0.0.0:0"),
         (&["--listen", "0", "--secrets", &open], &format!("eslvm: {open}: other users may read or write it")),
         (&["--listen", "/no/such/folder/s"], "eslvm: cannot listen for operators at /no/such/folder/s"),
     ] {

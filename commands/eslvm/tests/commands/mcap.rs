@@ -219,7 +219,7 @@ fn files_need_rights_and_have_to_be_of_mcap() {
         "--allow-read=/etc/a.mcap.",
         "--allow-write=/etc/b.mcap.",
         "none.mcap: No such file",
-        "a.txt: not a file of MCAP: it begins with",
+        "a.txt: not an MCAP file: it begins with",
         "folder: the folder has no file `.mcap`",
         "none/a.mcap: No such file",
         ":dat",
@@ -261,7 +261,7 @@ fn info_prints_figures_and_what_is_damaged() {
     let done = run(&folder, &["mcap", "info", "main.esl"]);
     assert_eq!(done.status, Some(2));
     assert!(
-        done.errors.contains("main.esl: not a file of MCAP: it begins with \"(require\""),
+        done.errors.contains("main.esl: not an MCAP file: it begins with \"(require\""),
         "{}",
         done.errors
     );
@@ -388,5 +388,5 @@ fn a_run_is_shown_to_this_machine_only() {
     let folder = Folder::with("foxglove-exposed", &[("main.esl", "(print 1)")]);
     let done = run(&folder, &["run", "--foxglove=0.0.0.0:0", "main.esl"]);
     assert_eq!((done.status, &*done.output), (Some(2), ""));
-    assert!(done.errors.contains("others could hear what is said at 0.0.0.0:0"), "{}", done.errors);
+    assert!(done.errors.contains("others could read the traffic at 0.0.0.0:0"), "{}", done.errors);
 }

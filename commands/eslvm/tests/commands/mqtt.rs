@@ -255,7 +255,7 @@ fn a_broker_may_send_anything_or_nothing() {
         (b"HTTP/1.1 400 Bad Request\r\n\r\n", b"", false, ("60", "60"), "(:OPEN :MQTT-ERROR)"),
         (b"\x20\x02\x00\x05", b"", true, ("60", "60"), "(:OPEN :MQTT-ERROR)"),
         (b"", b"", true, ("1/5", "60"), "(:OPEN :TIMEOUT)"),
-        // Half a message, one that is too long, one whose topic is no text.
+        // Half a message, one that is too long, one whose topic is not text.
         (WELCOME, b"\x30\x64\x00\x03a/b", false, ("60", "60"), "(:SUBSCRIBE :CONNECTION-LOST)"),
         (WELCOME, b"\x30\xff\xff\xff\x7f\x00\x01a", true, ("60", "60"), "(:SUBSCRIBE :CONNECTION-LOST)"),
         (WELCOME, b"\x30\x05\x00\x02\xff\xfex", true, ("60", "60"), "(:SUBSCRIBE :CONNECTION-LOST)"),

@@ -10,7 +10,8 @@ use esl_conformance::process;
 use crate::eslvm;
 use crate::mqtt::{printed_by, read_packet, with_broker};
 
-/// Topics that begin with `$` are for filters that say so. What the protocol does not allow is not sent.
+/// Topics that begin with `$` are for filters that say so. Messages that the protocol does not allow are not
+/// sent.
 #[test]
 fn wildcards_leave_out_the_topics_of_the_broker() {
     let Some((folder, _broker, port)) = with_broker("mqtt-topics", "") else { return };

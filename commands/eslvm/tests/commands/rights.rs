@@ -154,7 +154,7 @@ fn a_session_of_an_operator_has_the_same_flags() {
     assert_eq!(run.end(), Some(0));
 }
 
-/// Whatever reaches outside asks for its right; the refusal has the right, the object, and the whole flag.
+/// Each access to the outside asks for its right; the refusal has the right, the object, and the whole flag.
 #[cfg(unix)]
 #[test]
 fn every_access_to_the_outside_needs_its_right() {

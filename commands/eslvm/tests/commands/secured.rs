@@ -27,7 +27,7 @@ fn what_other_machines_reach_asks_for_a_certificate() {
     for option in [&["--metrics", "0.0.0.0:0"][..], &["--monitor=0.0.0.0:0"], &["--listen", "0.0.0.0:0"]] {
         let refused = process::run(&mut eslvm(&[&["run"], option, &[&program]].concat()), "");
         assert_eq!(refused.status, Some(2), "{option:?}");
-        let expected = "eslvm: others could hear what is said at 0.0.0.0:0: use --certificate FILE --key FILE, \
+        let expected = "eslvm: others could read the traffic at 0.0.0.0:0: use --certificate FILE --key FILE, \
                         or a port of 127.0.0.1, which others reach by ssh -L\n";
         assert_eq!(refused.errors, expected, "{option:?}");
     }

@@ -258,7 +258,7 @@ fn a_failure_waits_for_who_debugs_it() {
     );
     // A value in the place of what has failed: the task goes on with it.
     let left = client.ask_about("(swank:invoke-nth-restart-for-emacs 1 0)", &thread);
-    assert_eq!(left, "(:abort \"the task has left\")");
+    assert_eq!(left, "(:abort \"the task has left the debugger\")");
     assert_eq!(client.wait("(:debug-return "), format!("{thread} 1 nil)"));
     assert_eq!(client.wait("(:read-from-minibuffer "), format!("{thread} 1 \"Value: \" nil)"));
     client.send(&format!("(:emacs-return {thread} 1 \"(* 2 *speed*)\")"));
@@ -282,7 +282,7 @@ fn a_failure_waits_for_who_debugs_it() {
     client.begin("(swank:throw-to-toplevel)", &thread);
     let answer = client.answer(fails);
     assert!(answer.starts_with("(:abort \"") && answer.contains("LIST"), "{answer}");
-    // Questions that are no evaluations are not debugged.
+    // Questions that are not evaluations are not debugged.
     assert_eq!(client.ask("(swank:inspect-nth-part 99)"), "(:abort \"Part 99 does not exist.\")");
     // When the session ends, what it debugs ends with its failure.
     client.ask("(swank:interactive-eval \"(signal *go*)\")");
@@ -296,8 +296,8 @@ fn a_failure_waits_for_who_debugs_it() {
     assert_eq!(finished.output, "6\n");
 }
 
-/// A task that stands for the debugger is aborted, and ends by its limits, as any other. What may not wait
-/// does not stand.
+/// A task that stands for the debugger is aborted, and ends by its limits, as any other. A task that may not
+/// wait does not stand.
 #[test]
 fn who_stands_for_the_debugger_is_aborted_and_limited_like_others() {
     let folder = Folder::new("slime_limits");

@@ -293,7 +293,7 @@ fn a_thousand_connections_are_served_by_one_program() {
         (wait-until (>= served 1000) :on all)
         (format c \"~a~%\" line)))))";
     let folder = Folder::with("sockets-thousand", &[("server.esl", server)]);
-    // The limit that many systems begin with is no limit for it.
+    // The limit that many systems begin with is not a limit for it.
     let mut limited = Command::new("sh");
     limited.args(["-c", "ulimit -Sn 256 && exec \"$0\" run --allow-net server.esl", crate::ESLVM]);
     let mut server = process::start(limited.current_dir(folder.path()));

@@ -35,7 +35,7 @@ impl Output {
         Output { pieces, unread: String::new() }
     }
 
-    /// Reads on until behind a text. What follows it is left, however much comes at once.
+    /// Reads on until behind a text. The text behind it is left, however much comes at once.
     fn await_text(&mut self, text: &str) {
         loop {
             if let Some(at) = self.unread.find(text) {

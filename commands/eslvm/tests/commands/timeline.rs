@@ -118,7 +118,7 @@ fn check_contents(events: &[Value]) {
     assert!(count("s", "event GO") == 1 && count("i", "signals event GO") == 1);
     assert!(count("i", "fails with :OOPS") == 1 && count("i", "recovers from :OOPS") == 1);
     assert!(count("i", "fails with :LOST") == 1 && count("i", "failed") == 1);
-    assert!(count("i", "is to be aborted") == 1 && count("i", "aborted") == 1);
+    assert!(count("i", "abort requested") == 1 && count("i", "aborted") == 1);
     assert!(count("B", "collection") >= 1 && count("B", "pause") >= 2);
 }
 

@@ -186,7 +186,7 @@ fn rights_and_arguments_are_checked() {
         "(:PERMISSION-DENIED :NET \"localhost:1\" \"--allow-net=localhost:1\")",
         "(:PERMISSION-DENIED :NET \"localhost:443\" \"--allow-net=localhost:443\")",
         "(:WS-ERROR \"the URL `http://127.0.0.1:1/` begins neither with ws:// nor with wss://\")",
-        "(:WS-ERROR \"the URL of a connection has no part behind `#`\")",
+        "(:WS-ERROR \"the URL of a connection cannot have a part behind `#`\")",
         "(:WS-ERROR \"the header `upgrade` is the handshake's own; leave it out\")",
         "(:WS-ERROR \"`a b` is not a name of a protocol\")",
         ":CONNECTION-REFUSED",

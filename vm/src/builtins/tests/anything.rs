@@ -1,4 +1,4 @@
-//! Whatever a builtin is called with, it answers.
+//! A builtin answers for all arguments.
 
 use esl_bytecode::builtin::{BUILTINS, Builtin};
 

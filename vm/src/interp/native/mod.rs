@@ -220,7 +220,7 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
             make_words(&mut context);
             debug_assert!(
                 reply.status == GUESSED_WRONG || is_as_said(vm, &context),
-                "left at what it was not made for"
+                "left at an instruction without a side exit"
             );
         }
     }

@@ -216,14 +216,14 @@ pub(super) unsafe extern "C" fn value_of(context: *mut NativeContext, symbol: u6
     }
 }
 
-/// Sets a symbol that was bound and is no constant.
+/// Sets a symbol that was bound and is not a constant.
 pub(super) unsafe extern "C" fn set_value_of(context: *mut NativeContext, symbol: u64, value: u64) {
     // SAFETY: V4: machine code has found the flags in a symbol that is a constant of its function; the value
     // is one of the program.
     unsafe {
         let (vm, _) = parts(context);
         let is_set = vm.set_symbol_value(Value::from_bits(symbol), Value::from_bits(value));
-        debug_assert!(is_set.is_ok(), "a symbol that is no constant");
+        debug_assert!(is_set.is_ok(), "the symbol is not a constant");
         attend(context, vm);
     }
 }
