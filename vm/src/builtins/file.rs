@@ -65,7 +65,7 @@ pub(super) fn rename_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(file-write-date path)`
 pub(super) fn file_write_date(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (path, permitted) = permitted(vm, arguments[0], Right::Read)?;
-    match ask(vm, "dated", &path, FileRequest::Date(&permitted))? {
+    match ask(vm, "inspected", &path, FileRequest::Date(&permitted))? {
         FileAnswer::Date(seconds) => {
             Ok(Value::fixnum(seconds.saturating_add(UNIX_EPOCH)).unwrap_or(Value::NIL))
         }
