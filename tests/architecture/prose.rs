@@ -1,6 +1,6 @@
-//! Prose names things and actors: comments, docstrings, messages and documents say "the output", not "what was
-//! written", and "users who attach", not "whoever attaches". A negation is "is not"; the acting thing comes
-//! first, so nothing "is told" or "is to be" done.
+//! Prose names things and actors: comments, docstrings, messages and documents say "the output", not "what
+//! was written", and "users who attach", not "whoever attaches". A negation is "is not"; the acting thing
+//! comes first, so nothing "is told" or "is to be" done.
 
 use std::fs;
 

@@ -171,7 +171,7 @@ pub(crate) enum EslvmAction {
     /// badly: by a deadlock, a failure of the main task, a status other than 0. Writes each as a schedule,
     /// which `eslvm run --schedule` repeats. Exit status: 0 no schedule ends badly; 1 one does; 2 wrong
     /// usage, or a file that cannot be read or written; 3 the program does not compile or is refused; 7
-    /// none was found, which proves nothing: some were not tried, or the grain does not see all shared places.
+    /// none was found, which proves nothing: some were not tried, or the grain leaves out shared places.
     Explore {
         #[command(flatten)]
         options: ExploreArguments,
