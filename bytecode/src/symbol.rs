@@ -40,7 +40,7 @@ struct SymbolData {
 pub struct Symbol(Arc<SymbolData>);
 
 impl Symbol {
-    /// Returns the symbol `name` at home in `package`. Names are taken as they are: no case folding.
+    /// Returns the symbol `name` at home in `package`. Names keep their case.
     pub fn new(package: &Arc<str>, name: &str) -> Symbol {
         let hash = fnv(fnv(0xcbf2_9ce4_8422_2325, package.as_bytes()), name.as_bytes());
         Symbol(Arc::new(SymbolData { home: Home::Package(package.clone()), name: name.into(), hash }))

@@ -47,7 +47,7 @@ fn value(numbers: &mut Numbers<'_>, x: &BigRational) -> Value {
 fn rational_of(numbers: &Numbers<'_>, v: Value) -> BigRational {
     let integer = |v: Value| {
         let n = Int::of(numbers.heap, v).unwrap();
-        assert_eq!(v.is_fixnum(), n.as_fixnum().is_some(), "what fits is a fixnum");
+        assert_eq!(v.is_fixnum(), n.as_fixnum().is_some(), "a number that fits is a fixnum");
         n.to_big()
     };
     match numbers.heap.ratio(v) {

@@ -248,7 +248,7 @@ mod tests {
         assert_eq!(
             seen,
             [Known::Double, Known::Fixnum, Known::Nothing, Known::Nothing, Known::Nothing],
-            "what was not written yet tells against a fixnum, and not against a double"
+            "a register without a value tells against a fixnum, and not against a double"
         );
         assert_eq!(guesses(&[]), [Known::Nothing]);
     }

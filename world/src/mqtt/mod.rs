@@ -402,7 +402,7 @@ async fn subscribe(
     }
 }
 
-/// A subscription whose answer has yet to come. If that is left, or the answer is no, it is none.
+/// A subscription whose answer has yet to come. It is removed if the call is left, or if the broker refuses it.
 struct SubscribeRequest<'a> {
     shared: &'a ClientState,
     number: u64,
