@@ -402,7 +402,8 @@ async fn subscribe(
     }
 }
 
-/// A subscription whose answer has yet to come. It is removed if the call is left, or if the broker refuses it.
+/// A subscription whose answer has yet to come. It is removed if the call is left, or if the broker refuses
+/// it.
 struct SubscribeRequest<'a> {
     shared: &'a ClientState,
     number: u64,
