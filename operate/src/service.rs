@@ -5,7 +5,7 @@
 //! an inspection, which the machine answers between two turns and while its tasks wait, and passes on that it
 //! was answered. A machine that does not answer is not reported, so the manager ends and restarts it.
 //!
-//! Not here: the log. What a program prints goes to the journal as it is.
+//! Not here: the log. The output of a program goes to the journal as it is.
 
 use std::io;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
