@@ -140,6 +140,6 @@ fn main() -> Outcome {
         }
         ["count", address] => count(address),
         ["router", address] => router(address),
-        _ => Err("expected pong, ping, flood, count or router, and what belongs to it".into()),
+        _ => Err("expected pong, ping, flood, count or router, and its arguments".into()),
     }
 }
