@@ -27,6 +27,7 @@ use crate::data::{Data, MAX_DEPTH};
 ///
 /// assert_eq!(outcome(&mut engine, "(loop)"), Error::TicksUsed(100_000));
 /// assert_eq!(outcome(&mut engine, "(wait-for-event (make-event))"), Error::Deadlocked);
+/// assert_eq!(outcome(&mut engine, "(exit 3)"), Error::Exited(3));
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +54,9 @@ pub enum Error {
     },
     /// The evaluation was aborted: by the program, or by a [`ProcessSignal`](crate::host::ProcessSignal).
     Aborted,
+    /// The program has asked to end with this status: `(exit 3)`, in the evaluation or beside it. All tasks
+    /// are aborted, and run their cleanups; later evaluations begin another run.
+    Exited(u8),
     /// The evaluation waits for an event that no task can signal.
     Deadlocked,
     /// The machine has spent [`Config::budget`](crate::Config::budget), in this evaluation or an earlier one.
@@ -100,6 +104,7 @@ impl fmt::Display for Error {
             }
             Error::Failed { message, .. } => f.write_str(message),
             Error::Aborted => f.write_str("the evaluation was aborted"),
+            Error::Exited(status) => write!(f, "the program has ended with the status {status}"),
             Error::Deadlocked => f.write_str("the evaluation waits for an event that no task can signal"),
             Error::BudgetSpent => f.write_str(
                 "the machine has spent its budget of ticks: make a new one, or raise `Config::budget`",
@@ -148,6 +153,7 @@ impl From<CallError> for Error {
                 Error::Failed { cause, message, report, arguments, frames: frames.into_vec() }
             }
             CallError::Aborted => Error::Aborted,
+            CallError::Exited(status) => Error::Exited(status),
             CallError::Deadlocked => Error::Deadlocked,
             CallError::BudgetSpent => Error::BudgetSpent,
             CallError::TicksUsed(ticks) => Error::TicksUsed(ticks),

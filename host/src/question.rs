@@ -117,6 +117,8 @@ pub enum Answer {
     },
     /// The task of the call was aborted.
     Aborted,
+    /// The program has asked to end with this status, which has aborted the task of the call.
+    Exited(u8),
     /// The tasks that have not ended, in the order in which they were made.
     Tasks(Vec<TaskInfo>),
     /// The machine is gone, or the run has ended.

@@ -22,7 +22,7 @@ use std::sync::Arc;
 use esl_bytecode::BigInt;
 use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
 use esl_bytecode::span::{SourceId, Span};
-use esl_bytecode::symbol::Symbol;
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol, USER_PACKAGE};
 use esl_compiler::diagnostic::code;
 use esl_compiler::reader::{BareEnvironment, read_datum};
 
@@ -68,7 +68,8 @@ pub enum Data {
     String(String),
     /// A keyword, by its name: `:ON` is `Keyword("ON")`.
     Keyword(String),
-    /// Another symbol, by its name.
+    /// Another symbol, by its name: `VALVE`. One that is at home in a package that programs do not use from
+    /// the start has the package before it: `FLEET::VALVE`.
     Symbol(String),
     /// A proper list, not empty.
     List(Vec<Data>),
@@ -79,7 +80,10 @@ pub enum Data {
     /// A vector of numbers: of bytes, if that is its element type, or of floats, if all elements are.
     /// `Vec<f64>`, `Vec<u8>`, [`Bytes`] and others are made of it.
     Packed(PackedVector),
-    /// Something of the embedder's: an [`Opaque`] makes it, and is made of it.
+    /// Something of the embedder's: an [`Opaque`] makes it, and is made of it. An object of the program that
+    /// no data stands for, such as a task or a hash table, is opaque as well
+    /// ([`is_of_program`](OpaqueDatum::is_of_program)); what the program gets back is the text that describes
+    /// it.
     Opaque(OpaqueDatum),
 }
 
@@ -180,13 +184,14 @@ impl Data {
             Data::Character(value) => DatumKind::Character(*value),
             Data::String(value) => DatumKind::String(value.as_str().into()),
             Data::Keyword(name) => DatumKind::Symbol(Symbol::keyword(name)),
-            Data::Symbol(name) => return Datum::symbol(Symbol::new(&package.into(), name), span),
+            Data::Symbol(name) => return Datum::symbol(symbol_of(name, package), span),
             Data::List(items) => return list(items, Datum::nil(span)),
             Data::DottedList(items, tail) => return list(items, tail.to_datum(package)),
             Data::Vector(items) => {
                 DatumKind::Vector(items.iter().map(|item| item.to_datum(package)).collect())
             }
             Data::Packed(vector) => DatumKind::Packed(vector.clone()),
+            Data::Opaque(object) if object.is_of_program() => DatumKind::String(object.text().into()),
             Data::Opaque(opaque) => DatumKind::Opaque(opaque.clone()),
         };
         Datum::new(kind, span)
@@ -220,7 +225,7 @@ impl Data {
             DatumKind::Nil => Data::Nil,
             DatumKind::Symbol(symbol) if symbol.is_cl("T") => Data::True,
             DatumKind::Symbol(symbol) if symbol.is_keyword() => Data::Keyword(symbol.name().into()),
-            DatumKind::Symbol(symbol) => Data::Symbol(symbol.name().into()),
+            DatumKind::Symbol(symbol) => Data::Symbol(name_of(symbol)),
             DatumKind::Integer(value) => match i64::try_from(value) {
                 Ok(value) => Data::Integer(value),
                 Err(_) => Data::BigInteger(value.clone()),
@@ -245,6 +250,27 @@ impl Data {
                 }
             }
         }
+    }
+}
+
+/// Packages whose symbols need no package before them.
+const OPEN_PACKAGES: [&str; 3] = [CL_PACKAGE, ESL_PACKAGE, USER_PACKAGE];
+
+/// Returns the name of a symbol, with its package if it needs one.
+fn name_of(symbol: &Symbol) -> String {
+    match symbol.package() {
+        Some(package) if !OPEN_PACKAGES.contains(&&**package) => format!("{package}::{}", symbol.name()),
+        _ => symbol.name().to_owned(),
+    }
+}
+
+/// Returns the symbol of a name, which has a package before it or is of this package.
+fn symbol_of(name: &str, package: &str) -> Symbol {
+    match name.split_once("::") {
+        Some((package, name)) if !package.is_empty() && !name.is_empty() => {
+            Symbol::new(&package.into(), name)
+        }
+        _ => Symbol::new(&package.into(), name),
     }
 }
 

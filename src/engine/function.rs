@@ -94,3 +94,47 @@ impl Engine {
         T::from_data(&value).ok_or_else(|| Error::NotOfType { value: value.to_string(), expected: T::TYPE })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::Ending;
+
+    #[test]
+    fn symbols_and_objects_survive_the_way_or_say_that_they_do_not() {
+        let mut engine = Engine::new().expect("there is memory");
+        let setup = "(progn (defpackage \"FLEET\" (:use \"COMMON-LISP\")) (defun is-it (a b) (eq a b)))";
+        engine.eval(setup).expect("it evaluates");
+        for (text, name) in [
+            ("'valve", "VALVE"),
+            ("'car", "CAR"),
+            ("'assert", "ASSERT"),
+            ("'fleet::drive", "FLEET::DRIVE"),
+            ("'fleet::cdr", "CDR"),
+        ] {
+            let symbol = engine.eval(text).expect("it evaluates");
+            assert_eq!(symbol, Data::Symbol(name.into()));
+            let test = engine.function(&format!("(lambda (symbol) (eq symbol {text}))")).expect("a function");
+            assert_eq!(engine.call(&test, [symbol]), Ok(true), "{text}");
+        }
+        let objects = engine.eval("(list (make-hash-table) #'car)").expect("it evaluates");
+        let objects = objects.as_list().expect("it is a list");
+        let is_of_program = |data: &Data| matches!(data, Data::Opaque(opaque) if opaque.is_of_program());
+        assert!(objects.iter().all(is_of_program), "{objects:?}");
+        assert!(objects[1].to_string().contains("CAR"), "{objects:?}");
+        assert_ne!(objects[0], objects[0].to_string().as_str().into(), "it is not a text");
+    }
+
+    #[test]
+    fn an_exit_ends_the_run_and_not_the_engine() {
+        let mut engine = Engine::new().expect("there is memory");
+        engine.eval("(defun leave () (spawn (exit 4)) (sleep 5))").expect("it evaluates");
+        assert_eq!(engine.call::<Data>("leave", []), Err(Error::Exited(4)));
+        assert_eq!(engine.eval("(+ 1 2)"), Ok(Data::Integer(3)));
+        assert_eq!(engine.run(), Ending::Done, "the status belongs to the run before");
+        let (left, beside) = (engine.begin("(exit 5)"), engine.begin("(sleep 5)"));
+        assert_eq!(engine.run(), Ending::Exited(5));
+        assert_eq!((left.wait(), beside.wait()), (Err(Error::Exited(5)), Err(Error::Exited(5))));
+        assert_eq!(engine.eval("(abort-task (current-task))"), Err(Error::Aborted));
+    }
+}

@@ -219,8 +219,8 @@ impl<T> Reply<T> {
     /// Waits for the answer: on another thread than the one that runs the engine.
     ///
     /// # Errors
-    /// [`Error::Failed`], [`Error::Aborted`], [`Error::NotData`], [`Error::NotOfType`] if the value is of
-    /// another type, and [`Error::Ended`] if the engine is gone.
+    /// [`Error::Failed`], [`Error::Aborted`], [`Error::Exited`], [`Error::NotData`], [`Error::NotOfType`] if
+    /// the value is of another type, and [`Error::Ended`] if the engine is gone.
     pub fn wait(self) -> Result<T, Error> {
         (self.read)(self.pending.wait())
     }
@@ -253,6 +253,7 @@ fn error_of(answer: Answer) -> Error {
         Answer::Circular => Error::NotData(ExportError::Circular),
         Answer::TooLarge => Error::NotData(ExportError::TooLarge),
         Answer::Aborted => Error::Aborted,
+        Answer::Exited(status) => Error::Exited(status),
         Answer::Values(_) | Answer::Tasks(_) | Answer::Ended => Error::Ended,
     }
 }
@@ -294,6 +295,12 @@ pub struct TaskHandle {
 }
 
 impl TaskHandle {
+    /// Asks for a call in a task of its own.
+    pub(super) fn begin(sender: Sender, question: Question) -> TaskHandle {
+        let result = Reply::of_value(sender.ask(question));
+        TaskHandle { sender, result }
+    }
+
     /// Aborts the task: it unwinds and runs its cleanups. Nothing happens if it has ended.
     pub fn abort(&self) {
         self.sender.inbox().put(Incoming::AbortCall(self.result.pending.number()));
@@ -315,5 +322,14 @@ impl TaskHandle {
     /// Returns the result as a future.
     pub fn into_reply(self) -> Reply<Data> {
         self.result
+    }
+}
+
+/// Ready when the task has ended, with the first value of its function.
+impl Future for TaskHandle {
+    type Output = Result<Data, Error>;
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Result<Data, Error>> {
+        Pin::new(&mut self.result).poll(context)
     }
 }

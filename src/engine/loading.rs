@@ -7,7 +7,7 @@ use esl_bytecode::span::{SourceId, Span};
 use esl_compiler::reader::decode;
 use esl_vm::value::Value;
 
-use super::{Engine, Reply};
+use super::{Engine, Reply, TaskHandle};
 use crate::data::Data;
 use crate::error::Error;
 use crate::module_path::ModulePath;
@@ -61,10 +61,18 @@ impl Engine {
     /// # Errors
     /// [`Error::Unreadable`]; [`Error::DoesNotCompile`] if the file is not text.
     pub fn begin_load(&mut self, path: impl AsRef<Path>) -> Result<Reply<Data>, Error> {
+        self.spawn_load(path).map(TaskHandle::into_reply)
+    }
+
+    /// Has a source file evaluated as a task of the runs to come, which can be aborted.
+    ///
+    /// # Errors
+    /// As [`Engine::begin_load`].
+    pub fn spawn_load(&mut self, path: impl AsRef<Path>) -> Result<TaskHandle, Error> {
         let path = path.as_ref();
         let text = source_text(read(path)?)?;
         program::set_module_path(&mut self.machine, &ModulePath::new([path], &[]))?;
-        Ok(self.begin_as(&text, Some(&path.display().to_string())))
+        Ok(self.spawn_as(&text, Some(&path.display().to_string())))
     }
 
     /// Runs a compiled program: its top-level forms, one after another. Returns the first value of the last.

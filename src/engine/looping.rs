@@ -10,7 +10,7 @@ use esl_bytecode::datum::Datum;
 use esl_host::{FunctionRef, Question, Sender};
 use esl_vm::run::RunOutcome;
 
-use super::{Engine, Reply};
+use super::{Engine, Reply, TaskHandle};
 use crate::data::Data;
 
 /// Ticks that a future of a run takes at a time, so that others on its executor have their turns.
@@ -60,18 +60,34 @@ impl Engine {
     /// Has a text evaluated as a task of the runs to come, and returns what will become of it. Unlike
     /// [`Engine::eval`], does not run anything.
     pub fn begin(&mut self, text: &str) -> Reply<Data> {
-        self.begin_as(text, None)
+        self.spawn_text(text).into_reply()
     }
 
-    /// As [`Engine::begin`]; positions in the text are reported under the name, if there is one.
-    pub(super) fn begin_as(&mut self, text: &str, name: Option<&str>) -> Reply<Data> {
+    /// Has a text evaluated as a task of the runs to come, as [`Engine::begin`] does, which can be aborted.
+    ///
+    /// ```
+    /// use esl::{Engine, Error};
+    ///
+    /// let mut engine = Engine::new()?;
+    /// let patrol = engine.spawn_text("(loop (sleep 0.01))");
+    /// patrol.abort();
+    /// engine.run();
+    /// assert_eq!(patrol.wait(), Err(Error::Aborted));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn spawn_text(&mut self, text: &str) -> TaskHandle {
+        self.spawn_as(text, None)
+    }
+
+    /// As [`Engine::spawn_text`]; positions in the text are reported under the name, if there is one.
+    pub(super) fn spawn_as(&mut self, text: &str, name: Option<&str>) -> TaskHandle {
         let arguments = std::iter::once(text).chain(name).map(|text| Datum::string(text, Default::default()));
         let question = Question::Call {
             function: FunctionRef::Named("ESL::%EVAL-TEXT".into()),
             arguments: arguments.collect(),
             goes_first: false,
         };
-        Reply::of_value(Sender::new(&self.machine.inbox()).ask(question))
+        TaskHandle::begin(Sender::new(&self.machine.inbox()), question)
     }
 
     /// Runs tasks until all have ended or wait for what cannot come. Waits while all of them wait.
@@ -157,12 +173,17 @@ impl Engine {
 
     fn ending_of(&mut self, outcome: RunOutcome) -> Ending {
         self.machine.flush();
-        match (outcome, self.machine.exit_status()) {
-            (RunOutcome::BudgetSpent, _) => Ending::BudgetSpent,
-            (RunOutcome::Stopped | RunOutcome::TicksUsed, None) => Ending::Stopped,
-            (_, Some(status)) => Ending::Exited(status),
-            (RunOutcome::Waiting, None) => Ending::Deadlocked,
-            (RunOutcome::Done, None) => Ending::Done,
+        if outcome == RunOutcome::BudgetSpent {
+            return Ending::BudgetSpent;
+        }
+        if let Some(status) = self.machine.take_exit_status() {
+            return Ending::Exited(status);
+        }
+        match outcome {
+            RunOutcome::BudgetSpent => Ending::BudgetSpent,
+            RunOutcome::Stopped | RunOutcome::TicksUsed => Ending::Stopped,
+            RunOutcome::Waiting => Ending::Deadlocked,
+            RunOutcome::Done => Ending::Done,
         }
     }
 

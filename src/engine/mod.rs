@@ -298,6 +298,9 @@ impl Engine {
 
     /// Returns the reason why an evaluation did not return.
     fn error(&mut self, error: CallError) -> Error {
+        if matches!(error, CallError::Exited(_)) {
+            self.machine.take_exit_status();
+        }
         self.diagnose(error.into())
     }
 

@@ -13,6 +13,7 @@ use crate::compiler::Compilations;
 use crate::config::Config;
 use crate::cpu::Cpu;
 use crate::datum;
+use crate::describe::describe;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
 use crate::heap::{AllocError, HeapConfig, HeapStats, Kind};
@@ -125,6 +126,12 @@ impl Vm {
         self.outside.exit_status
     }
 
+    /// Returns the status with which the program has asked to end, and forgets it: calls from then on belong
+    /// to another run.
+    pub fn take_exit_status(&mut self) -> Option<u8> {
+        self.outside.exit_status.take()
+    }
+
     /// Names the task that a signal of the process aborts; reports call it the main task. A signal that has
     /// come while there was none is for this one.
     pub fn set_interruptible(&mut self, id: Option<TaskId>) {
@@ -197,13 +204,13 @@ impl Vm {
         })
     }
 
-    /// Returns a value as data. Objects that no data stands for, such as functions and hash tables, become a
-    /// string that describes them.
+    /// Returns a value as data. Objects that no data stands for, such as functions and hash tables, become
+    /// opaque data that describe them.
     ///
     /// # Errors
     /// [`ExportError`] if the value is circular, or too large.
     pub fn export(&mut self, value: Value) -> Result<Datum, ExportError> {
-        let (datum, work) = datum::export(&self.heap, &self.names, value)?;
+        let (datum, work) = datum::export(&self.heap, &self.names, value, describe)?;
         self.exchange.charge(work);
         Ok(datum)
     }

@@ -75,6 +75,17 @@ impl OpaqueDatum {
         OpaqueDatum { kind: kind.into(), text: text.into(), value }
     }
 
+    /// Creates a datum for an object of a program that no data stands for, such as a task or a hash table,
+    /// with a short text that describes it. It does not lead back to the object.
+    pub fn of_program(text: &str) -> OpaqueDatum {
+        OpaqueDatum { kind: "".into(), text: text.into(), value: Arc::new(ProgramObject) }
+    }
+
+    /// Returns whether it stands for an object of a program.
+    pub fn is_of_program(&self) -> bool {
+        self.value.is::<ProgramObject>()
+    }
+
     /// Returns the name of its type.
     pub fn kind(&self) -> &str {
         &self.kind
@@ -96,6 +107,9 @@ impl OpaqueDatum {
     }
 }
 
+/// Value of the datum of an object of a program.
+struct ProgramObject;
+
 impl PartialEq for OpaqueDatum {
     fn eq(&self, other: &OpaqueDatum) -> bool {
         self.identity() == other.identity()
@@ -110,6 +124,9 @@ impl fmt::Debug for OpaqueDatum {
 
 impl fmt::Display for OpaqueDatum {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_of_program() {
+            return f.write_str(&self.text);
+        }
         let space = if self.text.is_empty() { "" } else { " " };
         write!(f, "#<{}{space}{}>", self.kind, self.text)
     }

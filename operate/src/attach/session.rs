@@ -434,7 +434,7 @@ impl OperatorSession {
                 let reports = [WireForm::symbol(":failed"), WireForm::Text(report)].into_iter().chain(full);
                 Ok(WireForm::list(reports))
             }
-            Answer::Aborted => Err(OperatorRefusal::Aborted),
+            Answer::Aborted | Answer::Exited(_) => Err(OperatorRefusal::Aborted),
             Answer::Circular | Answer::TooLarge => Err(OperatorRefusal::ValueTooLarge),
             Answer::Ended => Err(OperatorRefusal::Ended),
             Answer::Tasks(_) => Err(OperatorRefusal::OtherAnswer),

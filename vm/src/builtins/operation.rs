@@ -3,6 +3,7 @@
 use crate::builtins::rights::demand;
 use crate::builtins::task::expect_task;
 use crate::datum::{self, DatumError};
+use crate::describe::describe;
 use crate::outside::GivenIndex;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::run;
@@ -25,7 +26,7 @@ pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(Option<GivenInde
     let mut data = Vec::new();
     let mut rest = arguments;
     while let Some(pair) = vm.heap.as_cons(rest) {
-        match datum::export(&vm.heap, &vm.names, pair.car) {
+        match datum::export(&vm.heap, &vm.names, pair.car, describe) {
             Ok((datum, work)) => {
                 vm.exchange.charge(work);
                 data.push(datum);

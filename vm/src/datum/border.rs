@@ -12,11 +12,16 @@ use crate::value::Value;
 /// Bytes of a text that are moved in the time of one unit of work.
 const BYTES_TOGETHER: usize = 4;
 
-/// Returns a value as data, and the work that it took.
+/// Returns a value as data, and the work that it took. An object that no data stands for is described.
 ///
 /// # Errors
 /// [`DatumError`].
-pub(crate) fn export(heap: &Heap, names: &Names, value: Value) -> Result<(Datum, usize), DatumError> {
+pub(crate) fn export(
+    heap: &Heap,
+    names: &Names,
+    value: Value,
+    describe: fn(&Heap, Value) -> String,
+) -> Result<(Datum, usize), DatumError> {
     // An atom shares nothing with other parts, so it needs neither walk nor memory.
     let plain = || Some(Datum::new(plain_kind(heap, value)?, Span::default()));
     if let Some(datum) = names.opaque_of(heap, value).cloned().or_else(plain) {
@@ -28,7 +33,7 @@ pub(crate) fn export(heap: &Heap, names: &Names, value: Value) -> Result<(Datum,
         let work = work_of(&datum);
         return Ok((datum, work));
     }
-    let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
+    let mut unit = Unit { describe: Some(describe), ..Unit::default() };
     if names.is_symbol(heap, value) {
         return Ok((unit.atom_datum(heap, names, value, Span::default()), 1));
     }
@@ -44,7 +49,8 @@ pub(super) fn work_of(datum: &Datum) -> usize {
     }
 }
 
-/// Returns data as a value, and the work that it took.
+/// Returns data as a value, and the work that it took. A symbol that is not at home in its package is the one
+/// of that name that the package inherits: `CAR` of a program is that of the language.
 ///
 /// # Errors
 /// As for every allocation.

@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use esl_bytecode::datum::{Datum, DatumKind, DatumRemains, ObjectId};
+use esl_bytecode::datum::{Datum, DatumKind, DatumRemains, ObjectId, OpaqueDatum};
 use esl_bytecode::properties::PropertyList;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Home, Symbol, symbol_of_setf_cell};
@@ -94,10 +94,12 @@ pub(crate) struct Unit {
     environments: Environments,
     /// Nodes visited since the last call of [`Unit::take_work`].
     work: u64,
-    /// Whether the data are for the embedder, which gets its own objects back.
-    is_for_embedder: bool,
+    /// Describes objects that no datum stands for, if the data are for the embedder, which gets its own
+    /// objects back.
+    describe: Option<fn(&Heap, Value) -> String>,
     /// Whether the data come from the host, and no object has to be led back to its datum: then only nodes
-    /// that may occur twice are remembered.
+    /// that may occur twice are remembered, and a symbol denotes the one that its name has in its package, which
+    /// may be inherited.
     is_from_host: bool,
 }
 
@@ -340,7 +342,10 @@ impl Unit {
         names: &mut Names,
         symbol: &Symbol,
     ) -> Result<Value, AllocError> {
-        let Home::Uninterned(id) = *symbol.home() else { return names.intern(heap, symbol) };
+        let Home::Uninterned(id) = *symbol.home() else {
+            let inherited = if self.is_from_host { names.inherited(symbol) } else { None };
+            return names.intern(heap, inherited.as_ref().unwrap_or(symbol));
+        };
         if let Some(object) = self.uninterned(id) {
             return Ok(object);
         }
@@ -422,7 +427,7 @@ impl Unit {
         let kind = self.atom_kind(heap, names, object);
         let datum = match kind {
             Some(kind) => Datum::of_kind(kind, span),
-            None => Datum::new(DatumKind::Object(self.pin(object)), span),
+            None => Datum::new(self.object_kind(heap, object), span),
         };
         if matches!(datum.kind(), DatumKind::String(_)) {
             self.remember(&datum, object);
@@ -430,12 +435,20 @@ impl Unit {
         datum
     }
 
+    /// Returns the kind of an object that no datum describes.
+    fn object_kind(&mut self, heap: &Heap, object: Value) -> DatumKind {
+        match self.describe {
+            Some(describe) => DatumKind::Opaque(OpaqueDatum::of_program(&describe(heap, object))),
+            None => DatumKind::Object(self.pin(object)),
+        }
+    }
+
     /// Returns the datum that describes an atom, if there is one.
     fn atom_kind(&mut self, heap: &Heap, names: &Names, object: Value) -> Option<DatumKind> {
         if names.is_symbol(heap, object) && !object.is_nil() {
             return Some(DatumKind::Symbol(self.symbol_name(heap, names, object)?));
         }
-        let opaque = || names.opaque_of(heap, object).filter(|_| self.is_for_embedder);
+        let opaque = || names.opaque_of(heap, object).filter(|_| self.describe.is_some());
         plain_kind(heap, object).or_else(|| Some(opaque()?.kind().clone()))
     }
 

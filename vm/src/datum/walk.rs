@@ -143,7 +143,7 @@ impl DatumWalk {
                         self.made.push(Datum::new(DatumKind::Object(unit.pin(object)), span));
                         continue;
                     }
-                    if unit.is_for_embedder
+                    if unit.describe.is_some()
                         && let Some(kind) = packed::whole_of(heap, object).map_err(WalkError::Datum)?
                     {
                         let datum = Datum::new(kind, span);
@@ -152,7 +152,8 @@ impl DatumWalk {
                         continue;
                     }
                     let parts = parts_of(heap, object);
-                    let parts = parts.or_else(|| vector_parts(heap, object).filter(|_| unit.is_for_embedder));
+                    let parts =
+                        parts.or_else(|| vector_parts(heap, object).filter(|_| unit.describe.is_some()));
                     let Some(parts) = parts else {
                         self.made.push(unit.atom_datum(heap, names, object, span));
                         continue;

@@ -208,6 +208,17 @@ impl Names {
         Ok(object)
     }
 
+    /// Returns the symbol that the package of this one inherits under its name. `None` if the symbol has an
+    /// object of its own, or the package inherits none.
+    pub(crate) fn inherited(&self, symbol: &Symbol) -> Option<Symbol> {
+        if self.symbols.contains_key(symbol) {
+            return None;
+        }
+        let packages = self.packages();
+        let package = packages.named(symbol.package()?)?;
+        packages.find(package, symbol.name()).map(|(found, _)| found)
+    }
+
     /// Returns the symbol of this name in `COMMON-LISP`.
     ///
     /// # Errors

@@ -252,7 +252,7 @@ pub(crate) fn failure_arguments(vm: &Vm, condition: Value) -> Vec<Datum> {
         return Vec::new();
     }
     let list = heap.structure_slots(condition).and_then(|slots| slots.get(1).copied()).unwrap_or(Value::NIL);
-    let export = |value| datum::export(heap, &vm.names, value).ok();
+    let export = |value| datum::export(heap, &vm.names, value, describe).ok();
     items(vm, list).filter_map(export).map(|(datum, _)| datum).collect()
 }
 

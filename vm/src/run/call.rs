@@ -43,6 +43,8 @@ pub enum CallError {
     },
     /// The task was aborted.
     Aborted,
+    /// The program has asked to end with this status, which has aborted the task.
+    Exited(u8),
     /// Every task waits for what cannot come.
     Deadlocked,
     /// The budget of the run is spent.
@@ -60,6 +62,7 @@ impl fmt::Display for CallError {
         match self {
             CallError::Failed { message, .. } => f.write_str(message),
             CallError::Aborted => f.write_str("it was aborted"),
+            CallError::Exited(status) => write!(f, "the program has ended with the status {status}"),
             CallError::Deadlocked => f.write_str("it waits for an event that cannot occur"),
             CallError::BudgetSpent => f.write_str("the budget of the run is spent"),
             CallError::TicksUsed(ticks) => write!(f, "it did not end within {ticks} ticks"),
@@ -145,7 +148,9 @@ impl Vm {
                 let failed = CallError::Failed { cause, message, report, arguments, frames };
                 return Err((failed, condition));
             }
-            (TaskResult::Aborted, _) => CallError::Aborted,
+            (TaskResult::Aborted, _) => {
+                self.outside.exit_status.map_or(CallError::Aborted, CallError::Exited)
+            }
             (TaskResult::Running, RunOutcome::Waiting) => CallError::Deadlocked,
             (TaskResult::Running, RunOutcome::BudgetSpent) => CallError::BudgetSpent,
             (TaskResult::Running, RunOutcome::Stopped) => CallError::Stopped,

@@ -7,6 +7,7 @@ use esl_host::{Answer, FunctionRef, Incoming, Kept, Question, TaskInfo};
 use super::finish::allocate_without_retry;
 use super::spawn::{SpawnOptions, spawn_kept};
 use crate::datum::{self, DatumError};
+use crate::describe::describe;
 use crate::report;
 use crate::task::{DEFAULT_PRIORITY, HIGHEST_PRIORITY, Task, TaskEnd, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
@@ -170,7 +171,10 @@ pub(super) fn answer_call(vm: &mut Vm, end: TaskEnd, values: &[Value]) -> bool {
             Answer::Failed { cause, message, report, full_report, arguments, frames }
         }
         TaskEnd::Aborted if all_are_to_end(vm) => Answer::Ended,
-        TaskEnd::Aborted | TaskEnd::Spent => Answer::Aborted,
+        TaskEnd::Aborted | TaskEnd::Spent => match vm.outside.exit_status {
+            Some(status) => Answer::Exited(status),
+            None => Answer::Aborted,
+        },
     };
     vm.outside.inbox.answer(number, answer);
     true
@@ -180,7 +184,7 @@ pub(super) fn answer_call(vm: &mut Vm, end: TaskEnd, values: &[Value]) -> bool {
 fn answer_with(vm: &Vm, values: &[Value]) -> Answer {
     let mut data = Vec::new();
     for &value in values {
-        match datum::export(&vm.heap, &vm.names, value) {
+        match datum::export(&vm.heap, &vm.names, value, describe) {
             Ok((datum, _)) => data.push(datum),
             Err(DatumError::Circular) => return Answer::Circular,
             Err(DatumError::TooLarge | DatumError::NoRoom(_)) => return Answer::TooLarge,
