@@ -23,7 +23,9 @@ mod handle;
 mod loading;
 mod looping;
 mod operation;
+mod patch;
 mod query;
+mod watch;
 
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -48,7 +50,9 @@ pub use function::{Callable, Function};
 pub use handle::{Handle, Reply, TaskHandle};
 pub use looping::{Ending, Poll, Running};
 pub use operation::Operation;
+pub use patch::{ProgramDefinition, ProgramDefinitionKind};
 pub use query::QueryAnswer;
+pub use watch::{FactWatch, WatchedFact};
 
 /// A machine with the library. Definitions last from one evaluation to the next.
 ///
@@ -67,6 +71,8 @@ pub struct Engine {
     ticks: u64,
     /// Runs the futures of operations.
     executor: Executor,
+    /// Number of watches over facts that were begun, which tells their names apart.
+    watches: u64,
 }
 
 impl Engine {
@@ -83,7 +89,8 @@ impl Engine {
     /// # Errors
     /// [`Error::NoMemory`], if the limit of memory leaves no room for the library.
     pub fn with(config: Config, host: Box<dyn Host + Send>) -> Result<Engine, Error> {
-        Ok(Engine { machine: program::machine(config, host)?, ticks: u64::MAX, executor: executor::thread() })
+        let machine = program::machine(config, host)?;
+        Ok(Engine { machine, ticks: u64::MAX, executor: executor::thread(), watches: 0 })
     }
 
     /// Limits the ticks (calls and turns of loops) of each evaluation.

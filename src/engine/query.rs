@@ -43,7 +43,7 @@ impl QueryAnswer {
     }
 
     /// Returns the bindings that a list of pairs stands for.
-    fn of_list(pairs: &Data) -> Option<QueryAnswer> {
+    pub(super) fn of_list(pairs: &Data) -> Option<QueryAnswer> {
         pairs.as_list()?.iter().map(binding).collect::<Option<_>>().map(QueryAnswer)
     }
 }
