@@ -10,16 +10,27 @@
         return 20 + 0.5 * number
 
     engine.eval("(loop for s to 5 when (> (read-sensor s) 21) collect s)")  # [3, 4, 5]
+
+`Engine` is where to begin. Values of programs that Python has no type for are in `esl.values`, exceptions in `esl.errors`;
+`esl.run` and `esl.replay` run whole programs. `esl.pytest_plugin` makes tests in ESL items of pytest,
+`%load_ext esl.ipython` gives notebooks the magic `%%esl`.
 """
 
-from .engine import Engine, Facts, Input, Inputs
+import os
+
+from . import _esl
+from ._esl import Handle, ProgramObject
+from .display import Event, TaskInfo, Tasks, Timeline
+from .engine import Definition, Engine
 from .errors import (
     Aborted,
     BudgetSpent,
     CompileError,
     Deadlocked,
+    Diagnostic,
     Ended,
     Error,
+    Exited,
     Failure,
     Frame,
     Full,
@@ -28,7 +39,12 @@ from .errors import (
     Place,
     Stopped,
 )
+from .facts import FactChange, Facts, Input, Inputs, Subscription
+from .program import Replay, RunResult, check, check_file, replay, run
 from .values import Character, Dotted, Keyword, Object, Symbol
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_esl.note_fork)
 
 __all__ = [
     "Aborted",
@@ -36,14 +52,20 @@ __all__ = [
     "Character",
     "CompileError",
     "Deadlocked",
+    "Definition",
+    "Diagnostic",
     "Dotted",
     "Ended",
     "Engine",
     "Error",
+    "Event",
+    "Exited",
+    "FactChange",
     "Facts",
     "Failure",
     "Frame",
     "Full",
+    "Handle",
     "Input",
     "Inputs",
     "Keyword",
@@ -51,6 +73,17 @@ __all__ = [
     "NoSuchInput",
     "Object",
     "Place",
+    "ProgramObject",
+    "Replay",
+    "RunResult",
     "Stopped",
+    "Subscription",
     "Symbol",
+    "TaskInfo",
+    "Tasks",
+    "Timeline",
+    "check",
+    "check_file",
+    "replay",
+    "run",
 ]

@@ -2,116 +2,68 @@
 
 from __future__ import annotations
 
-import asyncio
+import atexit
 import inspect
+import os
+import time
+import weakref
 from contextlib import asynccontextmanager
-from typing import Any, AsyncIterator, Awaitable, Callable, Iterable, Optional, TypeVar
+from typing import Any, AsyncIterator, Callable, Iterable, NamedTuple, Optional, TypeVar, Union
 
 from . import _esl
-from .errors import Ended
+from ._diagnosis import error_of, error_of_file
+from ._loop import PORTION, Awaited, Loop
+from ._progress import StatusLine
+from ._signature import Signature, arguments_of, program_name, signature_of
+from ._workers import run_in_thread
+from .display import Event, TaskInfo, Tasks, Timeline
+from .errors import CompileError, Ended, Failure
+from .facts import Facts, Inputs, Subscription
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# Ticks after which a loop lets its other tasks run.
-_PORTION = 100_000
+# A number of bytes, or a text such as "64M".
+Size = Union[int, str]
+
+_engines: "weakref.WeakSet[Engine]" = weakref.WeakSet()
 
 
-def _lambda_list(function: Callable[..., Any]) -> tuple[str, list[tuple[str, bool, Any]]]:
-    """Returns the lambda list of a function, and for each variable its name, whether it is a keyword, its default."""
-    required: list[str] = []
-    optional: list[str] = []
-    keys: list[str] = []
-    variables: list[tuple[str, bool, Any]] = []
-    for parameter in inspect.signature(function).parameters.values():
-        name = parameter.name.replace("_", "-")
-        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
-            raise TypeError(f"a function of a program has no parameter `*{parameter.name}`: name its arguments")
-        is_keyword = parameter.kind is parameter.KEYWORD_ONLY
-        if is_keyword:
-            keys.append(name)
-        elif parameter.default is parameter.empty:
-            required.append(name)
-        else:
-            optional.append(name)
-        variables.append((parameter.name, is_keyword, parameter.default))
-    # Whether an argument was given is asked of its variable, so that defaults are those of Python.
-    parts = required
-    if optional:
-        parts = parts + ["&optional"] + [f"({name} :%not-given)" for name in optional]
-    if keys:
-        parts = parts + ["&key"] + [f"({name} :%not-given)" for name in keys]
-    return f"({' '.join(parts)})", variables
+class Definition(NamedTuple):
+    """A definition of a program.
+
+    `kind` is "function", "operation", "macro", "property", "input", "variable" or "constant"; `parameters` are written
+    as in the program: "metres &key (speed 0.1)".
+    """
+
+    kind: str
+    name: str
+    parameters: str
+    documentation: str
 
 
-def _arguments(variables: list[tuple[str, bool, Any]], values: list[Any]) -> tuple[list[Any], dict[str, Any]]:
-    from .values import Keyword
-
-    not_given = Keyword("%not-given")
-    positional: list[Any] = []
-    keywords: dict[str, Any] = {}
-    for (name, is_keyword, default), value in zip(variables, values):
-        if value == not_given:
-            if default is inspect.Parameter.empty:
-                raise TypeError(f"the keyword argument `{name}` is missing")
-            value = default
-        if is_keyword:
-            keywords[name] = value
-        else:
-            positional.append(value)
-    return positional, keywords
-
-
-class Facts:
-    """The logical database of a program."""
-
-    def __init__(self, engine: "Engine") -> None:
-        self._engine = engine
-
-    def assert_(self, fact: Any) -> Any:
-        """Adds a fact, a text or a value. Returns whether it is new."""
-        return self._engine._answer(self._engine._handle().assert_fact(fact))
-
-    def retract(self, pattern: Any) -> Any:
-        """Removes the facts that match a pattern. Returns how many there were."""
-        return self._engine._answer(self._engine._handle().retract(pattern))
-
-    def query(self, query: Any) -> Any:
-        """Returns the answers to a query such as "(at ?robot ?place)": dictionaries of its variables."""
-        return self._engine._answer(self._engine._handle().query(query))
-
-
-class Input:
-    """An input of a program. Its signals come from any thread."""
-
-    def __init__(self, handle: _esl.Handle, name: str) -> None:
-        self._handle = handle
-        self.name = name
-
-    def signal(self, *arguments: Any) -> None:
-        """Signals the input. Waits while it is full, if that is its rule."""
-        self._handle.signal(self.name, *arguments)
-
-    def try_signal(self, *arguments: Any) -> None:
-        """Signals the input, and raises `Full` instead of waiting."""
-        self._handle.try_signal(self.name, *arguments)
-
-
-class Inputs:
-    """The inputs of a program, by their names: engine.inputs["scan"]. They keep the program waiting for signals."""
-
-    def __init__(self, engine: "Engine") -> None:
-        self._engine = engine
-
-    def __getitem__(self, name: str) -> Input:
-        return Input(self._engine._kept_handle(), name)
+def size_of(memory: Optional[Size]) -> Optional[int]:
+    """Returns a size as a number of bytes."""
+    if not isinstance(memory, str):
+        return memory
+    units = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
+    digits, unit = (memory[:-1], memory[-1].upper()) if memory[-1:].upper() in units else (memory, "")
+    if not digits.isdigit():
+        raise ValueError(f"`{memory}` is not a size: expected a number, optionally followed by K, M or G")
+    return int(digits) * units.get(unit, 1)
 
 
 class Engine:
     """A machine with the library of ESL. Definitions last from one evaluation to the next.
 
-    `clock` is "real" or "virtual"; `allow` lists rights as the options --allow-… have them: "net=127.0.0.1:1883";
-    `memory` is a number of bytes or a text such as "64M". An engine serves one thread at a time; other threads reach
-    it by `handle()` and `inputs`.
+    An engine serves one thread at a time; other threads reach it by `handle()` and `inputs`. It ends with the last
+    reference to it, or with the process: tasks that are left are aborted, and run their cleanups.
+
+    :param clock: "real", or "virtual": time that passes only while all tasks wait
+    :param allow: rights as the options --allow-… have them: ["net=127.0.0.1:1883"]; none by default
+    :param memory: limit of memory, a number of bytes or a text such as "64M"
+    :param seed: seed of random numbers
+    :param budget: ticks (calls and turns of loops) of the whole run
+    :param output: function called with the texts that programs write, in place of the standard streams
     """
 
     def __init__(
@@ -119,51 +71,84 @@ class Engine:
         *,
         clock: str = "real",
         allow: Iterable[str] = (),
-        memory: Optional[int | str] = None,
+        memory: Optional[Size] = None,
         seed: int = 0,
         budget: Optional[int] = None,
+        output: Optional[Callable[[str], object]] = None,
     ) -> None:
-        if isinstance(memory, str):
-            units = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
-            digits, unit = (memory[:-1], memory[-1].upper()) if memory[-1:].upper() in units else (memory, "")
-            if not digits.isdigit():
-                raise ValueError(f"`{memory}` is not a size: expected a number, optionally followed by K, M or G")
-            memory = int(digits) * units.get(unit, 1)
-        self._machine = _esl.Engine(clock=clock, allow=list(allow), memory=memory, seed=seed, budget=budget)
+        self._machine = _esl.Engine(
+            clock=clock, allow=list(allow), memory=size_of(memory), seed=seed, budget=budget, output=output
+        )
         self._shared_handle: Optional[_esl.Handle] = None
-        self._loop: Optional["_Loop"] = None
-        self.facts = Facts(self)
-        self.inputs = Inputs(self)
+        self._loop: Optional[Loop] = None
+        _engines.add(self)
+
+    @property
+    def facts(self) -> Facts:
+        """The logical database of the program."""
+        return Facts(self)
+
+    @property
+    def inputs(self) -> Inputs:
+        """The inputs of the program, by their names."""
+        return Inputs(self)
+
+    def __del__(self) -> None:
+        # Before the collector takes apart what cleanups call.
+        try:
+            self._machine.end()
+        except (AttributeError, RuntimeError, Ended):
+            # It was not made, is in a call of another thread, or belongs to another process.
+            pass
+
+    # ---- evaluating
 
     def eval(self, text: str) -> Any:
         """Evaluates the forms of a text and returns the first value of the last; while the engine runs in a loop, an
         awaitable of it."""
-        if self._loop:
-            return self._loop.answer(self._machine.begin(text))
+        loop = self._running_loop()
+        if loop:
+            return loop.evaluate(lambda: self._machine.begin(text), lambda error: error_of(error, text))
         return self._machine.eval(text)
 
-    def load(self, path: Any) -> Any:
-        """Evaluates a source file, or runs a compiled one (.eslb). Returns the first value of its last form."""
-        return self._machine.load(path)
+    def load(self, path: Union[str, "os.PathLike[str]"]) -> Any:
+        """Evaluates a source file, or runs a compiled one (.eslb). Returns the first value of its last form; while the
+        engine runs in a loop, an awaitable of it. A load that takes more than a second is shown at a terminal."""
+        loop = self._running_loop()
+        if loop and not os.fspath(path).endswith(".eslb"):
+            return loop.evaluate(lambda: self._machine.begin_load(path), lambda error: error_of_file(error, path))
+        with StatusLine(f"loading {os.fspath(path)}"):
+            try:
+                return self._machine.load(path)
+            except (CompileError, Failure) as error:
+                refused = error_of_file(error, path)
+                if refused is error:
+                    raise
+                raise refused from None
 
     def call(self, name: str, *arguments: Any) -> Any:
         """Calls a function of the program and returns its first value; while the engine runs in a loop, an awaitable
         of it. A call that is cancelled aborts its task."""
-        if self._loop:
-            return self._loop.call(name, arguments)
+        if self._loop is not None:
+            loop = self._running_loop()
+            if loop:
+                return loop.call(name, arguments)
         return self._machine.call(name, *arguments)
+
+    # ---- functions of Python
 
     def function(self, function: F) -> F:
         """Defines a function of the program by a function of Python, whose name, parameters and documentation it
         has: `max_speed` is MAX-SPEED, keyword-only parameters are keywords. An exception is a failure of the call:
         `esl.Failure` with its cause, any other with the cause :PYTHON-ERROR."""
-        lambda_list, variables = _lambda_list(function)
+        signature = signature_of(function)
 
         def call(*values: Any) -> Any:
-            positional, keywords = _arguments(variables, list(values))
+            positional, keywords = arguments_of(signature, list(values))
             return function(*positional, **keywords)
 
-        self._machine.define(_name(function), lambda_list, inspect.getdoc(function) or "", call)
+        called = function if signature.is_plain else call
+        self._machine.define(_name(function), signature.lambda_list, inspect.getdoc(function) or "", called)
         return function
 
     def operation(self, function: F) -> F:
@@ -172,28 +157,86 @@ class Engine:
         An async function runs as a task of the event loop in which the engine runs, and is cancelled when the program
         leaves the call, which waits until it has ended. Any other function runs on a thread of its own.
         """
-        lambda_list, variables = _lambda_list(function)
+        signature = signature_of(function)
         is_async = inspect.iscoroutinefunction(function)
+        # The machine holds the function, so it must not hold the engine.
+        this = weakref.ref(self)
 
         def begin(operation: _esl.Operation) -> None:
-            positional, keywords = _arguments(variables, operation.arguments)
-            if is_async:
-                if self._loop is None:
-                    raise RuntimeError(
-                        f"`{function.__name__}` is async, so the engine has to run in an event loop: "
-                        "`async with engine.running():`"
-                    )
-                self._loop.perform(operation, function(*positional, **keywords))
+            engine = this()
+            if not is_async:
+                _begin_in_thread(signature, function, operation)
+            elif engine is None:
+                operation.drop()
             else:
-                import threading
+                engine._begin_in_loop(signature, function, operation)
 
-                thread = threading.Thread(
-                    target=_perform, args=(operation, function, positional, keywords), daemon=True
-                )
-                thread.start()
-
-        self._machine.define_operation(_name(function), lambda_list, inspect.getdoc(function) or "", begin)
+        self._machine.define_operation(
+            _name(function), signature.lambda_list, inspect.getdoc(function) or "", begin
+        )
         return function
+
+    def _begin_in_loop(self, signature: Signature, function: Callable[..., Any], operation: _esl.Operation) -> None:
+        loop = self._running_loop()
+        if loop is None:
+            raise RuntimeError(
+                f"`{function.__name__}` is async, so the engine has to run in an event loop: "
+                "`async with engine.running():`"
+            )
+        positional, keywords = arguments_of(signature, operation.arguments)
+        loop.perform(operation, function(*positional, **keywords))
+
+    # ---- the program
+
+    def definitions(self, package: str = "esl-user") -> list[Definition]:
+        """Returns the definitions of the program in a package, sorted by name: of functions, macros, properties,
+        inputs and variables. Those of functions of Python are among them."""
+        return [Definition(*row) for row in self._machine.definitions(package)]
+
+    def patch(self, text: str, name: str = "patch") -> int:
+        """Makes the definitions of a text in the running program, all at once; none of them if any fails. Calls that
+        run keep the code that they have. Returns the number of definitions."""
+        return self._machine.patch(name, text)
+
+    def undo_patch(self) -> Optional[int]:
+        """Takes the newest patch back. Returns the number of its definitions, or None without a patch."""
+        return self._machine.undo_patch()
+
+    def tasks(self) -> Any:
+        """Returns the tasks that have not ended, which a notebook shows as a tree; while the engine runs in a loop, an
+        awaitable of them."""
+        return self._answer(self._handle().tasks(), lambda rows: Tasks(TaskInfo(*row) for row in rows))
+
+    def task_report(self) -> str:
+        """Returns a text that shows the tasks of the program."""
+        return self._machine.task_report()
+
+    def completions(self, prefix: str) -> list[tuple[str, str]]:
+        """Returns the names that begin with a prefix, in lower case, with the first line of their documentation."""
+        text = prefix.replace("\\", "\\\\").replace('"', '\\"')
+        rows = self._machine.eval(f'(esl::%completions "{text}")')
+        return [(name, about) for name, about in rows or []]
+
+    # ---- watching
+
+    def observe(self, function: Callable[[Event], object], kinds: Iterable[str] = ()) -> Subscription:
+        """Has a function called with each `Event` of a task of the program, or only with those of these kinds:
+
+            engine.observe(print, kinds=["begins", "fails", "ends"])
+
+        It is called on the thread on which the engine runs, which waits for it, and cannot call the engine.
+        """
+
+        def call(time: float, task: int, kind: str, detail: Optional[str]) -> None:
+            function(Event(time, task, kind, detail))
+
+        return Subscription(self._machine.observe(call, set(kinds)).stop)
+
+    def timeline(self) -> Timeline:
+        """Begins a drawing of the run, which a notebook shows: it ends with its `with` block."""
+        return Timeline(self._machine.timeline())
+
+    # ---- running
 
     def handle(self) -> _esl.Handle:
         """Returns a handle, through which other threads reach the run. While there is one, a program waits for what
@@ -201,24 +244,26 @@ class Engine:
         return self._machine.handle()
 
     def end(self) -> list[str]:
-        """Ends what still runs: aborts all tasks, runs their cleanups, cancels operations."""
+        """Ends what still runs: aborts all tasks, runs their cleanups, cancels operations. Returns what has not ended
+        in time."""
         return self._machine.end()
-
-    def task_report(self) -> str:
-        """Returns a text that shows the tasks of the program."""
-        return self._machine.task_report()
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator["Engine"]:
         """Runs the engine in the event loop while the body runs: evaluations and calls are awaitable meanwhile."""
-        if self._loop:
+        if self._running_loop():
             raise RuntimeError("the engine runs in an event loop already")
-        self._loop = _Loop(self._machine)
+        loop = self._loop = Loop(self._machine)
         try:
             yield self
         finally:
-            loop, self._loop = self._loop, None
+            self._loop = None
             await loop.close()
+
+    def _running_loop(self) -> Optional[Loop]:
+        if self._loop is not None and self._loop.is_over:
+            self._loop = None
+        return self._loop
 
     def _handle(self) -> _esl.Handle:
         return self._machine.handle()
@@ -228,128 +273,59 @@ class Engine:
             self._shared_handle = self._machine.handle()
         return self._shared_handle
 
-    def _answer(self, reply: _esl.Reply) -> Any:
-        if self._loop:
-            return self._loop.answer(reply)
+    def _answer(self, reply: Awaited, read: Callable[[Any], Any] = lambda value: value) -> Any:
+        loop = self._running_loop()
+        if loop:
+            future = loop.answer(reply)
+            return _read_later(future, read)
+        ending: Optional[BaseException] = None
         while True:
             has_come, value = reply.take()
             if has_come:
-                return value
-            self._machine.poll(_PORTION)
+                return read(value)
+            if ending is not None:
+                raise ending
+            ending = self._machine.poll(PORTION)[2]
+
+
+async def _read_later(future: Any, read: Callable[[Any], Any]) -> Any:
+    return read(await future)
 
 
 def _name(function: Callable[..., Any]) -> str:
-    return function.__name__.replace("_", "-")
+    return program_name(function.__name__)
 
 
-def _perform(operation: _esl.Operation, function: Callable[..., Any], positional: list[Any], keywords: dict[str, Any]) -> None:
-    try:
-        value = function(*positional, **keywords)
-    except BaseException as error:
-        operation.fail(error)
-    else:
-        operation.complete(value)
+def _begin_in_thread(signature: Signature, function: Callable[..., Any], operation: _esl.Operation) -> None:
+    positional, keywords = arguments_of(signature, operation.arguments)
 
-
-class _Loop:
-    """An engine that runs in an event loop: polled when it has something to do, or somebody waits for an answer."""
-
-    def __init__(self, machine: _esl.Engine) -> None:
-        self._machine = machine
-        self._loop = asyncio.get_running_loop()
-        # While it runs in a loop, anything may come.
-        self._handle = machine.handle()
-        self._waiting: list[tuple[_esl.Reply | _esl.Task, asyncio.Future[Any]]] = []
-        self._tasks: set[asyncio.Task[Any]] = set()
-        self._timer: Optional[asyncio.TimerHandle] = None
-        self._is_scheduled = False
-        self._is_closed = False
-        self._wakeup = machine.wakeup_fd()
-        self._loop.add_reader(self._wakeup, self._schedule)
-        self._schedule()
-
-    def _schedule(self) -> None:
-        if not self._is_scheduled and not self._is_closed:
-            self._is_scheduled = True
-            self._loop.call_soon(self._step)
-
-    def _step(self) -> None:
-        self._is_scheduled = False
-        if self._is_closed:
+    def perform() -> None:
+        try:
+            value = function(*positional, **keywords)
+        except BaseException as error:
+            operation.fail(error)
             return
-        if self._timer:
-            self._timer.cancel()
-            self._timer = None
-        is_busy, wait, _ = self._machine.poll(_PORTION)
-        self._take_answers()
-        if is_busy:
-            self._schedule()
-            return
-        if wait is not None:
-            self._timer = self._loop.call_later(wait, self._schedule)
-        self._machine.watch_wakeup()
+        try:
+            operation.complete(value)
+        except Exception as refused:
+            operation.fail(refused)
 
-    def _take_answers(self) -> None:
-        waiting, self._waiting = self._waiting, []
-        for reply, future in waiting:
-            if future.done():
-                continue
-            try:
-                has_come, value = reply.take()
-            except BaseException as error:
-                future.set_exception(error)
-            else:
-                if has_come:
-                    future.set_result(value)
-                else:
-                    self._waiting.append((reply, future))
+    run_in_thread(perform)
 
-    def answer(self, reply: _esl.Reply | _esl.Task) -> asyncio.Future[Any]:
-        future: asyncio.Future[Any] = self._loop.create_future()
-        self._waiting.append((reply, future))
-        self._schedule()
-        return future
 
-    def call(self, name: str, arguments: tuple[Any, ...]) -> asyncio.Future[Any]:
-        task = self._handle.spawn(name, *arguments)
-        future = self.answer(task)
-
-        def ended(future: asyncio.Future[Any]) -> None:
-            if future.cancelled():
-                task.abort()
-                self._schedule()
-
-        future.add_done_callback(ended)
-        return future
-
-    def perform(self, operation: _esl.Operation, coroutine: Awaitable[Any]) -> None:
-        task = asyncio.ensure_future(coroutine, loop=self._loop)
-        self._tasks.add(task)
-
-        def ended(task: asyncio.Task[Any]) -> None:
-            self._tasks.discard(task)
-            if task.cancelled():
-                operation.drop()
-            elif task.exception() is not None:
-                operation.fail(task.exception())
-            else:
-                try:
-                    operation.complete(task.result())
-                except Exception as error:
-                    operation.fail(error)
-
-        task.add_done_callback(ended)
-        operation.on_cancel(lambda: self._loop.call_soon_threadsafe(task.cancel))
-
-    async def close(self) -> None:
-        """Leaves the engine as it is; what waits for an answer fails with `Ended`."""
-        self._is_closed = True
-        self._loop.remove_reader(self._wakeup)
-        if self._timer:
-            self._timer.cancel()
-        for _, future in self._waiting:
-            if not future.done():
-                future.set_exception(Ended("the engine does not run in the event loop any more"))
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+@atexit.register
+def _end_all() -> None:
+    """Ends all engines while functions of Python can still be called by cleanups."""
+    is_left = False
+    for engine in list(_engines):
+        try:
+            engine.end()
+        except Ended:
+            pass
+        except RuntimeError:
+            # It is in a call of another thread, or belongs to another process.
+            is_left = True
+    _esl.note_exit()
+    if is_left:
+        # Threads that wait for the interpreter get it once more, and stay where they are from then on.
+        time.sleep(0.02)

@@ -12,6 +12,9 @@ class Place(NamedTuple):
     line: int
     column: int
 
+    def __str__(self) -> str:
+        return f"{self.source}:{self.line}:{self.column}"
+
 
 class Frame(NamedTuple):
     """A call that a failure has left unfinished."""
@@ -22,6 +25,33 @@ class Frame(NamedTuple):
     is_of_library: bool
 
 
+class Diagnostic(NamedTuple):
+    """A finding about a source text: an error, which keeps it from running, or a warning.
+
+    `code` is kebab-case, such as "unclosed-list"; docs/diagnostics.md explains each. `place` and `end` bound the part
+    of the text that it is about; `label` is a note on that part, `help` says what to do.
+    """
+
+    severity: str
+    code: str
+    message: str
+    place: Place
+    end: Place
+    label: str
+    help: Optional[str]
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.severity}[{self.code}]: {self.message}"
+
+
+def diagnostics_of(rows: Sequence[Any]) -> list[Diagnostic]:
+    """Returns the diagnostics of rows of the extension module."""
+    return [
+        Diagnostic(severity, code, message, Place(*place), Place(*end), label, help)
+        for severity, code, message, place, end, label, help in rows
+    ]
+
+
 class Error(Exception):
     """An evaluation has no value."""
 
@@ -29,9 +59,16 @@ class Error(Exception):
 class Failure(Error):
     """A failure of a program, or one for a function to fail with: Failure("valve-stuck", [3]).
 
-    `cause` is that of the failure, as the program prints it; `arguments` are its arguments; `frames` are the
-    calls that it has left unfinished, innermost first; `report` is what the commands print.
+    `cause` is that of the failure, as the program prints it: ":VALVE-STUCK". `arguments` are its arguments, `message` is
+    its text, `report` is what the commands print, and `frames` are the calls that it has left unfinished, innermost
+    first.
     """
+
+    cause: str
+    arguments: list[Any]
+    message: str
+    report: str
+    frames: list[Frame]
 
     def __init__(
         self,
@@ -56,7 +93,30 @@ class Failure(Error):
 
 
 class CompileError(Error):
-    """A text cannot be read or compiled. Its message has the errors with their places."""
+    """A text cannot be read or compiled. `diagnostics` has the errors as data, the message has them as the commands
+    print them."""
+
+    diagnostics: list[Diagnostic]
+
+    def __init__(self, message: str, diagnostics: Sequence[Any] = ()) -> None:
+        self.diagnostics = diagnostics_of(diagnostics)
+        super().__init__(message)
+
+    def __reduce__(self) -> Any:
+        return CompileError, (str(self), self.diagnostics)
+
+
+class Exited(Error):
+    """The program has ended itself: `(exit 3)` has the `status` 3. All its tasks are aborted, with their cleanups."""
+
+    status: int
+
+    def __init__(self, status: int) -> None:
+        self.status = status
+        super().__init__(f"the program has ended with the status {status}")
+
+    def __reduce__(self) -> Any:
+        return Exited, (self.status,)
 
 
 class Aborted(Error):

@@ -3,12 +3,18 @@
 Other values are those of Python: NIL is None, T is True, integers of any size are int, ratios Fraction, floats float,
 strings str. Lists are lists, vectors are tuples; vectors of bytes are bytes, and those of floats alone arrays of the
 module `array`. In the other direction False is NIL too, a dictionary becomes a property list, and an object with a
-buffer, such as an array of numpy, a vector of numbers.
+buffer of one dimension, such as an array of numpy, a vector of numbers.
+
+An object of the program that has no counterpart here, such as a task or a table, comes as a ProgramObject, which shows
+what it is; a program does not take it back.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
+
+
+_N = TypeVar("_N", bound="_Named")
 
 
 class _Named:
@@ -18,17 +24,28 @@ class _Named:
     def __init__(self, name: str) -> None:
         object.__setattr__(self, "name", name.upper())
 
+    @classmethod
+    def exact(cls: type[_N], name: str) -> _N:
+        """Returns the one of exactly this name: Symbol.exact("Valve") is |Valve|."""
+        made = object.__new__(cls)
+        object.__setattr__(made, "name", name)
+        return made
+
     def __setattr__(self, attribute: str, value: Any) -> None:
         raise AttributeError(f"{type(self).__name__} objects do not change")
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and other.name == self.name  # type: ignore[attr-defined]
+        return type(other) is type(self) and other.name == self.name
 
     def __hash__(self) -> int:
         return hash((type(self).__name__, self.name))
 
-    def __reduce__(self) -> tuple[type, tuple[str]]:
-        return type(self), (self.name,)
+    def __reduce__(self) -> tuple[Any, tuple[str]]:
+        return type(self).exact, (self.name,)
+
+    def __repr__(self) -> str:
+        exact = "" if self.name == self.name.upper() else ".exact"
+        return f"{type(self).__name__}{exact}({self.name!r})"
 
 
 class Keyword(_Named):
@@ -39,20 +56,14 @@ class Keyword(_Named):
     def __init__(self, name: str) -> None:
         super().__init__(name.lstrip(":"))
 
-    def __repr__(self) -> str:
-        return f"Keyword({self.name!r})"
-
     def __str__(self) -> str:
         return f":{self.name}"
 
 
 class Symbol(_Named):
-    """A symbol in the package ESL-USER: Symbol("valve") is VALVE."""
+    """A symbol, as a program writes it: Symbol("valve") is VALVE, and Symbol("fleet::drive") that of another package."""
 
     __slots__ = ()
-
-    def __repr__(self) -> str:
-        return f"Symbol({self.name!r})"
 
     def __str__(self) -> str:
         return self.name

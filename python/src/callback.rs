@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
 use crate::failure::of_exception;
+use crate::process::stay_at_exit;
 use crate::value::{to_data, to_python};
 
 /// Returns the arguments of a call.
@@ -18,6 +19,7 @@ fn arguments<'py>(py: Python<'py>, call: &Call) -> PyResult<Vec<Bound<'py, PyAny
 
 /// Calls a function of Python for a call of the program.
 pub(crate) fn call(function: &Py<PyAny>, call: &Call) -> Result<Data, Failure> {
+    stay_at_exit();
     Python::attach(|py| {
         let value = arguments(py, call)
             .and_then(|arguments| function.bind(py).call1(PyTuple::new(py, arguments)?))
@@ -28,6 +30,7 @@ pub(crate) fn call(function: &Py<PyAny>, call: &Call) -> Result<Data, Failure> {
 
 /// Begins an operation by a function of Python.
 pub(crate) fn begin(function: &Py<PyAny>, operation: esl::engine::Operation) {
+    stay_at_exit();
     Python::attach(|py| {
         let operation = Py::new(py, Operation(Mutex::new(Some(operation))));
         let begun = operation.and_then(|operation| {
@@ -44,7 +47,7 @@ pub(crate) fn begin(function: &Py<PyAny>, operation: esl::engine::Operation) {
 }
 
 /// Work for a task of the program, which waits for its end. It ends once, on any thread.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "esl._esl")]
 pub(crate) struct Operation(Mutex<Option<esl::engine::Operation>>);
 
 impl Operation {

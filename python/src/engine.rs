@@ -1,26 +1,35 @@
 //! Engines, and driving them until an answer has come.
 
+use std::collections::HashSet;
 use std::io::{self, Read, Write};
+use std::ops::{Deref, DerefMut};
 use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixStream;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
 use std::task::{Wake, Waker};
 use std::time::{Duration, Instant};
 
-use esl::engine::{Ending, Poll};
+use esl::engine::{Ending, Poll, ProgramDefinition};
 use esl::host::{RealHost, Right, Rights};
 use esl::{Config, Data, Error};
 use pyo3::exceptions::PyValueError;
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use crate::callback;
-use crate::failure::{busy, of_error};
-use crate::handle::{AwaitedReply, Handle, Reply, all_data};
+use crate::failure::{busy, exception, of_error, of_text};
+use crate::handle::{Handle, Task, all_data};
+use crate::output::{Output, screen};
+use crate::process::{Process, detached};
 use crate::value::to_python;
+use crate::watching::{Caller, Observation, Timeline, Watch};
 
 /// Ticks after which signals of the process are looked for.
 const PORTION: u64 = 1_000_000;
+
+/// Name of a text that is not from a file.
+const EVALUATED: &str = "<text>";
 
 /// Longest wait until signals of the process are looked for.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -66,19 +75,77 @@ impl Wakeup {
 }
 
 /// A machine in which programs run. It serves one thread at a time.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "esl._esl")]
 pub(crate) struct Engine {
-    engine: Mutex<esl::Engine>,
+    engine: Mutex<Owned>,
     bell: Arc<Bell>,
     wakeup: Mutex<Option<Wakeup>>,
+    process: Process,
+    /// Functions of Python that the machine holds, for the collector of Python.
+    functions: Mutex<Vec<Weak<Py<PyAny>>>>,
+}
+
+/// The engine of an `Engine`, which is taken away when that is dropped.
+struct Owned(Option<esl::Engine>);
+
+const IS_THERE: &str = "it is there until it is dropped";
+
+impl Deref for Owned {
+    type Target = esl::Engine;
+
+    fn deref(&self) -> &esl::Engine {
+        self.0.as_ref().expect(IS_THERE)
+    }
+}
+
+impl DerefMut for Owned {
+    fn deref_mut(&mut self) -> &mut esl::Engine {
+        self.0.as_mut().expect(IS_THERE)
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        self.give_up();
+    }
 }
 
 impl Engine {
-    fn lock(&self) -> PyResult<MutexGuard<'_, esl::Engine>> {
-        match self.engine.try_lock() {
-            Ok(engine) => Ok(engine),
-            Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
-            Err(TryLockError::WouldBlock) => Err(busy()),
+    fn lock(&self) -> PyResult<MutexGuard<'_, Owned>> {
+        self.process.check()?;
+        let engine = match self.engine.try_lock() {
+            Ok(engine) => engine,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return Err(busy()),
+        };
+        if engine.0.is_some() { Ok(engine) } else { Err(Python::attach(|py| of_error(py, Error::Ended))) }
+    }
+
+    /// Returns a function for the machine to hold.
+    fn hold(&self, function: Py<PyAny>) -> Arc<Py<PyAny>> {
+        let function = Arc::new(function);
+        let mut functions = self.functions.lock().unwrap_or_else(PoisonError::into_inner);
+        if functions.len() == functions.capacity() {
+            functions.retain(|function| function.strong_count() > 0);
+        }
+        functions.push(Arc::downgrade(&function));
+        function
+    }
+
+    /// Drops the engine: what still runs ends.
+    fn give_up(&self) {
+        let engine = match self.engine.try_lock() {
+            Ok(mut engine) => engine.0.take(),
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner().0.take(),
+            // A call holds it, and the object of the call holds this one.
+            Err(TryLockError::WouldBlock) => return,
+        };
+        if self.process.is_current() {
+            // Cleanups may wait for functions of Python on other threads.
+            Python::attach(|py| py.detach(|| drop(engine)));
+        } else {
+            // Its tasks and their cleanups belong to the process that has made it.
+            std::mem::forget(engine);
         }
     }
 
@@ -88,43 +155,44 @@ impl Engine {
         py: Python<'py>,
         engine: &mut esl::Engine,
         reply: &esl::engine::Reply<Data>,
+        text: (&str, &str),
     ) -> PyResult<Bound<'py, PyAny>> {
         loop {
-            let ending = py.detach(|| self.portion(engine));
+            let polled = detached(py, || engine.poll(Instant::now(), PORTION));
             if let Some(result) = reply.take() {
-                return to_python(py, &result.map_err(|error| of_error(py, engine.diagnose(error)))?);
+                let (source, text) = text;
+                return match result {
+                    Ok(data) => to_python(py, &data),
+                    Err(error) => Err(of_text(py, engine.diagnose(error), source, text)),
+                };
             }
-            if let Some(ending) = ending {
-                return Err(of_ending(py, ending));
+            match polled {
+                Poll::Busy => {}
+                Poll::Idle { until } => detached(py, || self.wait(engine, until)),
+                Poll::Ended(ending) => return Err(of_ending(py, ending)),
             }
             if let Err(interrupt) = py.check_signals() {
-                py.detach(|| engine.end());
+                detached(py, || engine.end());
                 return Err(interrupt);
             }
         }
     }
 
-    /// Runs a portion, and waits for a while if all tasks do. Returns the end of the run if it has ended.
-    fn portion(&self, engine: &mut esl::Engine) -> Option<Ending> {
-        match engine.poll(Instant::now(), PORTION) {
-            Poll::Busy => None,
-            Poll::Ended(ending) => Some(ending),
-            Poll::Idle { until } => {
-                let left = until.map(|until| until.saturating_duration_since(Instant::now()));
-                engine.wake_when_ready(&Waker::from(self.bell.clone()));
-                let is_rung = self.bell.is_rung.lock().unwrap_or_else(PoisonError::into_inner);
-                let wait = left.unwrap_or(PAUSE).min(PAUSE);
-                let waited = self.bell.rung.wait_timeout_while(is_rung, wait, |is_rung| !*is_rung);
-                *waited.unwrap_or_else(PoisonError::into_inner).0 = false;
-                None
-            }
-        }
+    /// Waits until a time, or until something comes for the engine, but not longer than signals of the
+    /// process may wait.
+    fn wait(&self, engine: &mut esl::Engine, until: Option<Instant>) {
+        let left = until.map(|until| until.saturating_duration_since(Instant::now()));
+        engine.wake_when_ready(&Waker::from(self.bell.clone()));
+        let is_rung = self.bell.is_rung.lock().unwrap_or_else(PoisonError::into_inner);
+        let wait = left.unwrap_or(PAUSE).min(PAUSE);
+        let waited = self.bell.rung.wait_timeout_while(is_rung, wait, |is_rung| !*is_rung);
+        *waited.unwrap_or_else(PoisonError::into_inner).0 = false;
     }
 }
 
 fn of_ending(py: Python<'_>, ending: Ending) -> PyErr {
     match ending {
-        Ending::Exited(status) => pyo3::exceptions::PySystemExit::new_err(status),
+        Ending::Exited(status) => exception(py, "Exited", (status,)),
         Ending::BudgetSpent => of_error(py, Error::BudgetSpent),
         Ending::Stopped => of_error(py, Error::Stopped),
         _ => of_error(py, Error::Deadlocked),
@@ -132,7 +200,7 @@ fn of_ending(py: Python<'_>, ending: Ending) -> PyErr {
 }
 
 /// Reads rights as `--allow-…` has them.
-fn rights(allow: &[String]) -> PyResult<Rights> {
+pub(crate) fn rights(allow: &[String]) -> PyResult<Rights> {
     let mut rights = Rights::none();
     for text in allow {
         let (name, object) =
@@ -152,7 +220,7 @@ fn rights(allow: &[String]) -> PyResult<Rights> {
 #[pymethods]
 impl Engine {
     #[new]
-    #[pyo3(signature = (*, clock = "real", allow = Vec::new(), memory = None, seed = 0, budget = None))]
+    #[pyo3(signature = (*, clock = "real", allow = Vec::new(), memory = None, seed = 0, budget = None, output = None))]
     fn new(
         py: Python<'_>,
         clock: &str,
@@ -160,6 +228,7 @@ impl Engine {
         memory: Option<usize>,
         seed: u64,
         budget: Option<u64>,
+        output: Option<Py<PyAny>>,
     ) -> PyResult<Engine> {
         let host = RealHost::new(Vec::new()).with_rights(rights(&allow)?);
         let host = match clock {
@@ -170,29 +239,57 @@ impl Engine {
                 return Err(PyValueError::new_err(text));
             }
         };
+        let output = output.map(Arc::new);
+        let functions = output.iter().map(Arc::downgrade).collect();
+        let host = match output {
+            Some(function) => host.with_screen(screen(Output::new(function))),
+            None => host,
+        };
         let memory = memory.unwrap_or(Config::DEFAULT.memory);
         let config = Config { memory, seed, budget, ..Config::default() };
         let engine = py.detach(|| esl::Engine::with(config, Box::new(host)));
-        let engine = engine.map_err(|error| of_error(py, error))?;
-        Ok(Engine { engine: Mutex::new(engine), bell: Arc::default(), wakeup: Mutex::default() })
+        let engine = Mutex::new(Owned(Some(engine.map_err(|error| of_error(py, error))?)));
+        Ok(Engine {
+            engine,
+            bell: Arc::default(),
+            wakeup: Mutex::default(),
+            process: Process::current(),
+            functions: Mutex::new(functions),
+        })
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        // While another thread adds a function, the engine is in use.
+        let Ok(functions) = self.functions.try_lock() else { return Ok(()) };
+        functions.iter().filter_map(Weak::upgrade).try_for_each(|function| visit.call(&*function))
+    }
+
+    fn __clear__(&self) {
+        self.give_up();
     }
 
     /// Evaluates the forms of a text, and returns the first value of the last.
     fn eval<'py>(&self, py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyAny>> {
         let mut engine = self.lock()?;
         let reply = engine.begin(text);
-        self.drive(py, &mut engine, &reply)
+        self.drive(py, &mut engine, &reply, (EVALUATED, text))
     }
 
     /// Evaluates the forms of a source file, and returns the first value of the last; runs a compiled file.
     fn load<'py>(&self, py: Python<'py>, path: std::path::PathBuf) -> PyResult<Bound<'py, PyAny>> {
-        let engine = &mut *self.lock()?;
+        let engine = &mut **self.lock()?;
         if path.extension().is_some_and(|extension| extension == "eslb") {
-            let data = py.detach(|| engine.load(&path)).map_err(|error| of_error(py, error))?;
+            let data = detached(py, || engine.load(&path)).map_err(|error| of_error(py, error))?;
             return to_python(py, &data);
         }
         let reply = engine.begin_load(&path).map_err(|error| of_error(py, error))?;
-        self.drive(py, engine, &reply)
+        let text = std::fs::read_to_string(&path).unwrap_or_default();
+        self.drive(py, engine, &reply, (&path.display().to_string(), &text))
+    }
+
+    /// Has a source file evaluated as a task of the runs to come.
+    fn begin_load(&self, py: Python<'_>, path: std::path::PathBuf) -> PyResult<Task> {
+        Ok(Task::new(self.lock()?.spawn_load(&path).map_err(|error| of_error(py, error))?))
     }
 
     /// Calls a function of the program, by its name in any case, and returns its first value.
@@ -206,7 +303,7 @@ impl Engine {
         let data = all_data(arguments)?;
         let mut engine = self.lock()?;
         let reply = engine.handle().call(name, data);
-        self.drive(py, &mut engine, &reply)
+        self.drive(py, &mut engine, &reply, (EVALUATED, ""))
     }
 
     /// Defines a function that programs call and Python implements.
@@ -219,6 +316,7 @@ impl Engine {
         function: Py<PyAny>,
     ) -> PyResult<()> {
         let mut engine = self.lock()?;
+        let function = self.hold(function);
         let defined =
             engine.define(name, lambda_list, documentation, move |call| callback::call(&function, &call));
         defined.map_err(|error| of_error(py, error))
@@ -234,31 +332,34 @@ impl Engine {
         begin: Py<PyAny>,
     ) -> PyResult<()> {
         let mut engine = self.lock()?;
+        let begin = self.hold(begin);
         let begin = move |operation| callback::begin(&begin, operation);
         engine.define_operation(name, lambda_list, documentation, begin).map_err(|error| of_error(py, error))
     }
 
     /// Returns a handle, through which other threads reach the run.
     fn handle(&self) -> PyResult<Handle> {
-        Ok(Handle(self.lock()?.handle()))
+        Ok(Handle::new(self.lock()?.handle()))
     }
 
     /// Has a text evaluated as a task of the runs to come.
-    fn begin(&self, text: &str) -> PyResult<Reply> {
-        Ok(Reply::new(AwaitedReply::Value(self.lock()?.begin(text))))
+    fn begin(&self, text: &str) -> PyResult<Task> {
+        Ok(Task::new(self.lock()?.spawn_text(text)))
     }
 
     /// Runs tasks for a number of ticks, and never waits. Returns whether some task can go on at once, the
-    /// seconds until the first goes on if it waits for a time, and whether the run has ended.
-    fn poll(&self, py: Python<'_>, ticks: u64) -> PyResult<(bool, Option<f64>, bool)> {
-        let engine = &mut *self.lock()?;
-        Ok(match py.detach(|| engine.poll(Instant::now(), ticks)) {
-            Poll::Busy => (true, None, false),
+    /// seconds until the first goes on if it waits for a time, and the exception of a run that has ended
+    /// before its tasks have.
+    fn poll(&self, py: Python<'_>, ticks: u64) -> PyResult<(bool, Option<f64>, Option<PyErr>)> {
+        let engine = &mut **self.lock()?;
+        Ok(match detached(py, || engine.poll(Instant::now(), ticks)) {
+            Poll::Busy => (true, None, None),
             Poll::Idle { until } => {
                 let wait = until.map(|until| until.saturating_duration_since(Instant::now()).as_secs_f64());
-                (false, wait, false)
+                (false, wait, None)
             }
-            Poll::Ended(_) => (false, None, true),
+            Poll::Ended(Ending::Done | Ending::Exited(_)) => (false, None, None),
+            Poll::Ended(ending) => (false, None, Some(of_ending(py, ending))),
         })
     }
 
@@ -285,8 +386,60 @@ impl Engine {
 
     /// Ends what still runs: aborts all tasks, runs their cleanups, cancels operations.
     fn end(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        let engine = &mut *self.lock()?;
-        Ok(py.detach(|| engine.end()))
+        let engine = &mut **self.lock()?;
+        Ok(detached(py, || engine.end()))
+    }
+
+    /// Makes the definitions of a text in the running program. Returns their number.
+    fn patch(&self, py: Python<'_>, name: &str, text: &str) -> PyResult<usize> {
+        let engine = &mut **self.lock()?;
+        detached(py, || engine.patch(name, text)).map_err(|error| of_text(py, error, name, text))
+    }
+
+    /// Takes the newest patch back. Returns the number of its definitions, or nothing without one.
+    fn undo_patch(&self, py: Python<'_>) -> PyResult<Option<usize>> {
+        let engine = &mut **self.lock()?;
+        detached(py, || engine.undo_patch()).map_err(|error| of_error(py, error))
+    }
+
+    /// The definitions of a package: kind, name, parameters and documentation.
+    fn definitions(
+        &self,
+        py: Python<'_>,
+        package: &str,
+    ) -> PyResult<Vec<(&'static str, String, String, String)>> {
+        let engine = &mut **self.lock()?;
+        let definitions =
+            detached(py, || engine.definitions(package)).map_err(|error| of_error(py, error))?;
+        let row = |row: ProgramDefinition| (row.kind.name(), row.name, row.parameters, row.documentation);
+        Ok(definitions.into_iter().map(row).collect())
+    }
+
+    /// Has a function called with the seconds since the first observer came, the number of a task, a kind and
+    /// a detail, for each event of one of these kinds, or of all if there are none.
+    fn observe(&self, function: Py<PyAny>, kinds: HashSet<String>) -> PyResult<Observation> {
+        let (caller, observation) = Caller::new(self.hold(function), kinds);
+        self.lock()?.handle().subscribe(caller);
+        Ok(observation)
+    }
+
+    /// Has the run drawn from now on.
+    fn timeline(&self) -> PyResult<Timeline> {
+        let (drawer, timeline) = Timeline::begin();
+        self.lock()?.handle().subscribe(drawer);
+        Ok(timeline)
+    }
+
+    /// Has a function called with whether a fact is there now, the fact, and a dictionary of the variables of
+    /// the pattern, for each change of a fact that matches it.
+    fn watch_facts(
+        &self,
+        py: Python<'_>,
+        pattern: &Bound<'_, PyAny>,
+        function: Py<PyAny>,
+    ) -> PyResult<Watch> {
+        let pattern = crate::handle::pattern(pattern)?;
+        Watch::begin(&mut *self.lock()?, pattern, self.hold(function)).map_err(|error| of_error(py, error))
     }
 
     /// The tasks of the program, as a text.

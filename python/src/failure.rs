@@ -3,6 +3,7 @@
 use esl::engine::Failure;
 use esl::host::{FailureFrame, SendError};
 use esl::{Data, Error};
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use pyo3::call::PyCallArgs;
 use pyo3::exceptions::{PyFileNotFoundError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -14,7 +15,7 @@ use crate::value::{held, hold, to_data, to_python};
 const PYTHON_ERROR: &str = "PYTHON-ERROR";
 
 /// Returns an exception of `esl.errors`.
-fn exception<'py>(py: Python<'py>, class: &str, arguments: impl PyCallArgs<'py>) -> PyErr {
+pub(crate) fn exception<'py>(py: Python<'py>, class: &str, arguments: impl PyCallArgs<'py>) -> PyErr {
     let made = py.import("esl.errors").and_then(|errors| errors.getattr(class)?.call1(arguments));
     made.map_or_else(|error| error, PyErr::from_value)
 }
@@ -36,14 +37,82 @@ pub(crate) fn of_error(py: Python<'_>, error: Error) -> PyErr {
             of_failure(py, &cause, &message, &report, &arguments, &frames).unwrap_or_else(|error| error)
         }
         Error::DoesNotCompile(_) => exception(py, "CompileError", (message,)),
+        Error::Exited(status) => exception(py, "Exited", (status,)),
         Error::Aborted => exception(py, "Aborted", (message,)),
         Error::Deadlocked => exception(py, "Deadlocked", (message,)),
         Error::BudgetSpent | Error::TicksUsed(_) => exception(py, "BudgetSpent", (message,)),
         Error::Stopped => exception(py, "Stopped", (message,)),
         Error::Ended => exception(py, "Ended", (message,)),
         Error::NoMemory(_) => exception(py, "NoMemory", (message,)),
-        Error::Unreadable { .. } => PyFileNotFoundError::new_err(message),
+        Error::Unreadable { file, .. } => unreadable(py, &file, message),
         _ => exception(py, "Error", (message,)),
+    }
+}
+
+/// Returns the exception of the operating system for a file that cannot be read.
+fn unreadable(py: Python<'_>, file: &str, message: String) -> PyErr {
+    match std::fs::File::open(file).map(drop) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            let number = error.raw_os_error().unwrap_or(0);
+            pyo3::exceptions::PyOSError::new_err((number, message, file.to_owned()))
+        }
+        _ => {
+            let errno = py.import("errno").and_then(|errno| errno.getattr("ENOENT")?.extract::<i32>());
+            PyFileNotFoundError::new_err((errno.unwrap_or(2), message, file.to_owned()))
+        }
+    }
+}
+
+/// Returns the exception of an error of an engine in the evaluation of a text, whose name is that of its file
+/// if it is from one.
+pub(crate) fn of_text(py: Python<'_>, error: Error, source: &str, text: &str) -> PyErr {
+    let Error::DoesNotCompile(diagnostics) = &error else { return of_error(py, error) };
+    let places = Places::new(source, text);
+    match places.all(py, diagnostics) {
+        Ok(list) => exception(py, "CompileError", (error.to_string(), list)),
+        Err(error) => error,
+    }
+}
+
+/// Places of one text, by line and column.
+pub(crate) struct Places<'a> {
+    source: &'a str,
+    text: &'a str,
+}
+
+impl<'a> Places<'a> {
+    pub(crate) fn new(source: &'a str, text: &'a str) -> Places<'a> {
+        Places { source, text }
+    }
+
+    /// Returns the line and the column of a byte of the text; both count from 1.
+    fn place(&self, byte: u32) -> (&'a str, usize, usize) {
+        let before = self.text.get(..byte as usize).unwrap_or(self.text);
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let line = 1 + before.bytes().filter(|&byte| byte == b'\n').count();
+        (self.source, line, 1 + before[line_start..].chars().count())
+    }
+
+    /// Returns diagnostics of the text as the arguments of `esl.Diagnostic`.
+    pub(crate) fn all<'py>(
+        &self,
+        py: Python<'py>,
+        diagnostics: &[Diagnostic],
+    ) -> PyResult<Bound<'py, PyList>> {
+        let row = |diagnostic: &Diagnostic| {
+            let span = diagnostic.primary.span;
+            let is_error = diagnostic.severity == Severity::Error;
+            (
+                if is_error { "error" } else { "warning" },
+                diagnostic.code,
+                diagnostic.message.clone(),
+                self.place(span.start),
+                self.place(span.end),
+                diagnostic.primary.text.clone(),
+                diagnostic.help.clone(),
+            )
+        };
+        PyList::new(py, diagnostics.iter().map(row))
     }
 }
 

@@ -7,6 +7,10 @@
 //! | `engine` | engines, and driving them until an answer has come |
 //! | `callback` | functions and operations that Python implements |
 //! | `handle` | other threads, and answers to come |
+//! | `watching` | events of tasks, changes of facts, drawings |
+//! | `program` | whole programs: diagnostics, tests, recordings |
+//! | `output` | the output of programs |
+//! | `process` | copies of the process |
 //!
 //! Guarantees: the interpreter's lock is released while a machine runs. Exceptions of a callback are failures
 //! of the call.
@@ -18,7 +22,11 @@ mod callback;
 mod engine;
 mod failure;
 mod handle;
+mod output;
+mod process;
+mod program;
 mod value;
+mod watching;
 
 use pyo3::prelude::*;
 
@@ -30,5 +38,13 @@ mod _esl {
     #[pymodule_export]
     use super::engine::Engine;
     #[pymodule_export]
-    use super::handle::{Handle, Reply, Task};
+    use super::handle::{Handle, Mailbox, Reply, Task};
+    #[pymodule_export]
+    use super::process::{note_exit, note_fork};
+    #[pymodule_export]
+    use super::program::{Tests, check, replay, run};
+    #[pymodule_export]
+    use super::value::ProgramObject;
+    #[pymodule_export]
+    use super::watching::{Observation, Timeline, Watch};
 }

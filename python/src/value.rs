@@ -34,10 +34,41 @@ pub(crate) fn held(py: Python<'_>, data: &Data) -> Option<Py<PyAny>> {
     Opaque::<Held>::from_data(data)?.with(|held| held.0.clone_ref(py)).ok()
 }
 
+/// Something that a program holds and Python does not look into: an object of a module of the library, which
+/// the program gets back as itself, or an object of the program, such as a task or a table, which does not
+/// return.
+#[pyclass(frozen, module = "esl", name = "ProgramObject")]
+pub(crate) struct ProgramObject(Data);
+
+#[pymethods]
+impl ProgramObject {
+    fn __repr__(&self) -> String {
+        format!("<{} of an ESL program>", self.0.to_string().trim_start_matches("#<").trim_end_matches('>'))
+    }
+
+    fn __str__(&self) -> String {
+        self.0.to_string()
+    }
+}
+
+/// Returns the data of an object, for a program to have it back.
+fn returned(object: &ProgramObject) -> PyResult<Data> {
+    match &object.0 {
+        Data::Opaque(opaque) if opaque.is_of_program() => Err(PyTypeError::new_err(format!(
+            "{} belongs to a program and cannot be passed to one: keep it in a variable of the program, and pass \
+             the name",
+            object.0
+        ))),
+        data => Ok(data.clone()),
+    }
+}
+
 /// The classes of `esl.values`, and those of the standard library that values become.
 struct Classes {
     keyword: Py<PyAny>,
     symbol: Py<PyAny>,
+    exact_keyword: Py<PyAny>,
+    exact_symbol: Py<PyAny>,
     character: Py<PyAny>,
     dotted: Py<PyAny>,
     object: Py<PyAny>,
@@ -53,6 +84,8 @@ fn classes(py: Python<'_>) -> PyResult<&Classes> {
         Ok(Classes {
             keyword: class("Keyword")?,
             symbol: class("Symbol")?,
+            exact_keyword: values.getattr("Keyword")?.getattr("exact")?.unbind(),
+            exact_symbol: values.getattr("Symbol")?.getattr("exact")?.unbind(),
             character: class("Character")?,
             dotted: class("Dotted")?,
             object: class("Object")?,
@@ -91,8 +124,8 @@ fn convert<'py>(py: Python<'py>, data: &Data, depth: u32) -> PyResult<Bound<'py,
         Data::Float(value) => PyFloat::new(py, *value).into_any(),
         Data::Character(value) => classes(py)?.character.bind(py).call1((value.to_string(),))?,
         Data::String(value) => PyString::new(py, value).into_any(),
-        Data::Keyword(name) => classes(py)?.keyword.bind(py).call1((name,))?,
-        Data::Symbol(name) => classes(py)?.symbol.bind(py).call1((name,))?,
+        Data::Keyword(name) => classes(py)?.exact_keyword.bind(py).call1((name,))?,
+        Data::Symbol(name) => classes(py)?.exact_symbol.bind(py).call1((name,))?,
         Data::List(items) => PyList::new(py, all(items)?)?.into_any(),
         Data::DottedList(items, tail) => {
             let items = PyList::new(py, all(items)?)?;
@@ -108,7 +141,7 @@ fn convert<'py>(py: Python<'py>, data: &Data, depth: u32) -> PyResult<Bound<'py,
         }
         Data::Opaque(_) => match held(py, data) {
             Some(object) => object.into_bound(py),
-            None => return Err(PyTypeError::new_err(format!("{data} is not an object of Python"))),
+            None => Bound::new(py, ProgramObject(data.clone()))?.into_any(),
         },
     })
 }
@@ -133,14 +166,14 @@ fn read(object: &Bound<'_, PyAny>, depth: u32) -> PyResult<Data> {
     if object.is_instance_of::<PyInt>() {
         return Ok(match object.extract::<i64>() {
             Ok(value) => Data::Integer(value),
-            Err(_) => Data::BigInteger(object.extract::<BigInt>()?),
+            Err(_) => of_integer(object.extract::<BigInt>()?),
         });
     }
     if let Ok(value) = object.cast::<PyFloat>() {
         return Ok(Data::Float(value.value()));
     }
     if let Ok(value) = object.cast::<PyString>() {
-        return Ok(Data::String(value.to_string_lossy().into_owned()));
+        return Ok(Data::String(value.to_cow()?.into_owned()));
     }
     if let Ok(value) = object.cast::<PyList>() {
         return Ok(Data::list(all(value.iter().collect())?));
@@ -150,6 +183,12 @@ fn read(object: &Bound<'_, PyAny>, depth: u32) -> PyResult<Data> {
     }
     if let Ok(value) = object.cast::<PyDict>() {
         return properties(value, depth);
+    }
+    if let Ok(value) = object.cast::<PyBytes>() {
+        return Ok(Data::bytes(value.as_bytes().to_vec()));
+    }
+    if let Ok(value) = object.cast::<ProgramObject>() {
+        return returned(value.get());
     }
     let classes = classes(py)?;
     let is = |class: &Py<PyAny>| object.is_instance(class.bind(py));
@@ -166,7 +205,7 @@ fn read(object: &Bound<'_, PyAny>, depth: u32) -> PyResult<Data> {
     }
     if is(&classes.fraction)? {
         let part = |name: &str| object.getattr(name)?.extract::<BigInt>();
-        return ratio(part("numerator")?, part("denominator")?);
+        return Ok(ratio(part("numerator")?, part("denominator")?));
     }
     if is(&classes.dotted)? {
         let items = all(object.getattr("items")?.try_iter()?.collect::<PyResult<_>>()?)?;
@@ -175,14 +214,11 @@ fn read(object: &Bound<'_, PyAny>, depth: u32) -> PyResult<Data> {
     if is(&classes.object)? {
         return Ok(hold(object.getattr("value")?.unbind()));
     }
-    vector(object)
+    vector(object, depth)
 }
 
-fn ratio(numerator: BigInt, denominator: BigInt) -> PyResult<Data> {
-    if denominator != BigInt::from(1) {
-        return Ok(Data::Ratio(numerator, denominator));
-    }
-    Ok(i64::try_from(&numerator).map_or(Data::BigInteger(numerator), Data::Integer))
+fn ratio(numerator: BigInt, denominator: BigInt) -> Data {
+    if denominator == BigInt::from(1) { of_integer(numerator) } else { Data::Ratio(numerator, denominator) }
 }
 
 /// Returns the property list of a dictionary, whose keys become keywords: `max_speed` is `:MAX-SPEED`.
@@ -199,14 +235,26 @@ fn properties(dictionary: &Bound<'_, PyDict>, depth: u32) -> PyResult<Data> {
     Ok(Data::list(items))
 }
 
-/// Returns the vector of numbers of an object with a buffer, such as an array of numpy.
-fn vector(object: &Bound<'_, PyAny>) -> PyResult<Data> {
+/// Returns the vector of numbers of an object with a buffer, such as an array of numpy; the number of one
+/// without dimensions.
+fn vector(object: &Bound<'_, PyAny>, depth: u32) -> PyResult<Data> {
     let py = object.py();
     let Ok(view) = py.import("builtins")?.getattr("memoryview")?.call1((object,)) else {
         let name = object.get_type().name()?.to_string();
         let text = format!("a value of type {name} has no counterpart in ESL: wrap it as esl.Object(value)");
         return Err(PyTypeError::new_err(text));
     };
+    match view.getattr("ndim")?.extract::<usize>()? {
+        0 => return read(&object.call_method0("item")?, depth),
+        1 => {}
+        dimensions => {
+            let text = format!(
+                "an array of {dimensions} dimensions has no counterpart in ESL: pass its shape and \
+                 `array.ravel()`, or `array.tolist()`"
+            );
+            return Err(PyTypeError::new_err(text));
+        }
+    }
     let format: String = view.getattr("format")?.extract()?;
     let bytes = view.call_method0("tobytes")?;
     let bytes = bytes.cast::<PyBytes>()?.as_bytes();
@@ -218,8 +266,15 @@ fn vector(object: &Bound<'_, PyAny>) -> PyResult<Data> {
                 .collect::<Vec<$target>>()
         };
     }
+    let no_counterpart = |format: &str| {
+        PyTypeError::new_err(format!(
+            "a buffer of elements `{format}` has no counterpart in ESL: convert it, as by \
+             `array.astype(\"float64\")` or `array.tolist()`"
+        ))
+    };
     let size = view.getattr("itemsize")?.extract::<usize>()?;
-    Ok(match (format.trim_start_matches(['@', '=', '<']), size) {
+    let native = if cfg!(target_endian = "little") { ['@', '=', '<'] } else { ['@', '=', '>'] };
+    Ok(match (format.trim_start_matches(native), size) {
         ("B" | "c", 1) => Data::bytes(bytes.to_vec()),
         ("d", 8) => Data::floats(numbers!(f64 => f64)),
         ("f", 4) => Data::floats(numbers!(f32 => f64)),
@@ -229,9 +284,19 @@ fn vector(object: &Bound<'_, PyAny>) -> PyResult<Data> {
         ("i" | "l", 4) => Data::integers(numbers!(i32 => i64)),
         ("I" | "L", 4) => Data::integers(numbers!(u32 => i64)),
         ("q" | "l", 8) => Data::integers(numbers!(i64 => i64)),
-        _ => {
-            let text = format!("a buffer of elements `{format}` has no counterpart in ESL: convert it first");
-            return Err(PyTypeError::new_err(text));
+        ("Q" | "L", 8) => {
+            let numbers = numbers!(u64 => u64);
+            let fitting: Result<Vec<i64>, _> = numbers.iter().map(|&n| i64::try_from(n)).collect();
+            match fitting {
+                Ok(integers) => Data::integers(integers),
+                Err(_) => Data::Vector(numbers.into_iter().map(|n| of_integer(n.into())).collect()),
+            }
         }
+        _ => return Err(no_counterpart(&format)),
     })
+}
+
+/// Returns an integer of any size as data.
+fn of_integer(value: BigInt) -> Data {
+    i64::try_from(&value).map_or(Data::BigInteger(value), Data::Integer)
 }

@@ -383,7 +383,7 @@ impl Unit {
     /// Returns the datum of an object with these parts: the one from which it was made, unless its parts have
     /// changed.
     fn compound(&mut self, heap: &Heap, object: Value, parts: Vec<Datum>, span: Span) -> Datum {
-        if self.is_for_embedder {
+        if self.describe.is_some() {
             // The walk knows the objects that it has met, and no object was made from a datum.
             return datum_with(heap, object, parts, span);
         }

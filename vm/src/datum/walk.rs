@@ -179,7 +179,7 @@ impl DatumWalk {
                     }
                 }
                 Some(ToDatum::Build(object, count)) => {
-                    let datum = if unit.is_for_embedder && heap.as_cons(object).is_some() {
+                    let datum = if unit.describe.is_some() && heap.as_cons(object).is_some() {
                         let cdr = self.made.pop().unwrap_or_else(|| Datum::nil(span));
                         let car = self.made.pop().unwrap_or_else(|| Datum::nil(span));
                         Datum::cons(car, cdr, span)
