@@ -153,7 +153,7 @@ pub struct InputRow {
     pub dropped: u64,
 }
 
-/// A call that a failure has left unfinished.
+/// A call that a failure has left unfinished, or one that a tail call of its function has replaced.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FailureFrame {
     /// Name of its task in reports.
@@ -164,6 +164,9 @@ pub struct FailureFrame {
     pub place: Option<SourcePlace>,
     /// Whether the function belongs to the library, or to a module that comes with the machine.
     pub is_of_library: bool,
+    /// Whether the function has left by a tail call. Where it stood is unknown if several of its tail calls
+    /// may have led on.
+    pub has_left: bool,
 }
 
 /// A failure that has happened.

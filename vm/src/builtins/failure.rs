@@ -223,9 +223,11 @@ pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let variables: Vec<_> = vm.frames().take(limit).map(variables).collect();
     let shown: usize = variables.iter().map(Vec::len).sum();
     let note = vm.note_frames(limit)?;
-    for (frame, variables) in vm.noted_frames(note).into_iter().zip(variables) {
-        let mut pairs = Vec::with_capacity(variables.len());
-        for (name, value) in variables {
+    let mut variables = variables.into_iter();
+    for frame in vm.noted_frames(note) {
+        let variables = if frame.has_left { None } else { variables.next() };
+        let mut pairs = Vec::new();
+        for (name, value) in variables.unwrap_or_default() {
             let name = vm.heap.alloc_str(&name)?;
             pairs.push(vm.heap.cons(name, value)?);
         }
@@ -248,6 +250,7 @@ fn row_of(vm: &mut Vm, frame: &NotedFrame, variables: Value) -> Result<Value, Al
     fields[frame::COLUMN] = column;
     fields[frame::VARIABLES] = variables;
     fields[frame::LIBRARY_P] = Value::boolean(frame.is_of_library);
+    fields[frame::LEFT_P] = Value::boolean(frame.has_left);
     vm.heap.list(&fields)
 }
 

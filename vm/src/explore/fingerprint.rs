@@ -8,8 +8,8 @@
 //!
 //! Which fields of the machine belong to it is said by `state`, and visited in `content`. Not part of a
 //! state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that will not be read
-//! (`live`), what is reachable from code only, and the outside. While a query or a compilation is under way
-//! at a point, the state equals no other.
+//! (`live`), where failures began, what is reachable from code only, and the outside. While a query or a
+//! compilation is under way at a point, the state equals no other.
 //!
 //! A *strict* fingerprint is of all that the list calls state of the run: ticks, numbers, the order of
 //! queues, times as they are, all objects in registers, the collector's state, and where objects lie. Two
@@ -182,7 +182,8 @@ impl Fingerprints {
         if !is_strict && vm.scheduler.points.has_clock {
             digest.add(now);
         }
-        let mut walk = Walk { vm, known: self, digest, met, next: 0, now, task: None, is_strict };
+        let histories = vm.names.find_class(vm.names.known.history);
+        let mut walk = Walk { vm, known: self, digest, met, next: 0, now, task: None, histories, is_strict };
         walk.machine(walk.vm);
         while let Some(&object) = walk.met.get(walk.next) {
             walk.next += 1;
@@ -220,6 +221,8 @@ pub(super) struct Walk<'a> {
     now: u64,
     /// The task that is being visited.
     pub(super) task: Option<&'a Task>,
+    /// The class of histories of failures, if it is defined.
+    histories: Option<Value>,
     /// Whether the course belongs to the fingerprint.
     pub(super) is_strict: bool,
 }
@@ -404,12 +407,7 @@ impl Walk<'_> {
             Kind::Task => {
                 let slots = vm.heap.record(v, Kind::Task).unwrap_or_default().to_vec();
                 let is_alive = slots[event::STATE].is_fixnum();
-                let has_failed = slots[event::STATE] == vm.names.known.failed;
-                for (index, mut v) in slots.into_iter().enumerate() {
-                    if has_failed && index == event::RESULT && !self.is_strict {
-                        // Where it has failed makes no difference.
-                        v = event::failure(&vm.heap, v).0;
-                    }
+                for (index, v) in slots.into_iter().enumerate() {
                     // Where it is, and what it belongs to.
                     if self.is_strict || !(is_alive && (index == event::STATE || index == event::RESULT)) {
                         self.value(v);
@@ -429,6 +427,8 @@ impl Walk<'_> {
                     }
                 }
             }
+            // Where a failure began makes no difference, wherever that is noted.
+            Kind::Structure if !self.is_strict && self.is_history(v) => {}
             Kind::Package | Kind::Class => self.digest.add_text(&vm.describe(v)),
             kind if kind.is_record() => {
                 let slots = vm.heap.record(v, kind).unwrap_or_default();
@@ -436,6 +436,11 @@ impl Walk<'_> {
             }
             _ => self.raw(v),
         }
+    }
+
+    /// Returns whether an object is the history of a failure.
+    fn is_history(&self, v: Value) -> bool {
+        self.histories.is_some() && self.heap().structure_class(v) == self.histories
     }
 
     /// An object that its digest identifies.

@@ -60,6 +60,7 @@ define_known! {
     structure_object = cl "STRUCTURE-OBJECT";
     raise = esl "%RAISE";
     failure = esl "FAILURE";
+    history = esl "%HISTORY";
     reserve = esl "%RESERVE";
     expander_text = esl "%EXPANDER-TEXT";
     macro_usage = esl "%MACRO-USAGE";

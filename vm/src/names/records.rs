@@ -57,5 +57,5 @@ define_records! {
     history { FRAMES, RECOVERIES, ORIGIN, CAUSES }
 
     /// A frame of a backtrace.
-    frame { FUNCTION, SOURCE, LINE, COLUMN, VARIABLES, LIBRARY_P }
+    frame { FUNCTION, SOURCE, LINE, COLUMN, VARIABLES, LIBRARY_P, LEFT_P }
 }

@@ -2,13 +2,15 @@
 //! reported.
 //!
 //! A note is a simple vector: the code with which the task began, and for each frame, innermost first, its
-//! code and a number, twice the word at which it stands, and one more if it is a form at top level. Failures
-//! that a form takes over from its tasks, or that go on after a cleanup, carry such notes with them: see
+//! code and a number: flags, and in front of them the word at which it stands plus one, 0 if that is unknown.
+//! Functions that have left by a tail call are among the frames, as far as they are known. Failures that a
+//! form takes over from its tasks, or that go on after a cleanup, carry such notes with them: see
 //! `handlers.esl`.
 
 use esl_bytecode::compile::SourcePlace;
 use esl_host::FailureFrame;
 
+use super::tail_calls::{TailCallSearch, TailCaller, UNITS_PER_WORD};
 use super::task_label;
 use crate::describe::describe;
 use crate::heap::AllocError;
@@ -24,6 +26,13 @@ const MOST_TASKS: usize = 100;
 /// Words of a function among which one is looked for that has a place.
 const WORDS_TO_PLACE: u32 = 64;
 
+/// Flag of a frame in a note: it is that of a form at top level.
+const AT_TOP_LEVEL: usize = 1;
+/// Flag of a frame in a note: its function has left by a tail call.
+const BY_TAIL_CALL: usize = 2;
+/// Bits of a frame's number for flags.
+const FLAG_BITS: u32 = 2;
+
 /// A frame of a note.
 pub(crate) struct NotedFrame {
     /// Name of its function: a symbol or a list, `NIL` if it has none.
@@ -34,6 +43,8 @@ pub(crate) struct NotedFrame {
     pub place: Option<SourcePlace>,
     /// Whether its function is one of the library.
     pub is_of_library: bool,
+    /// Whether its function has left by a tail call, so that the task has no such frame.
+    pub has_left: bool,
 }
 
 impl Vm {
@@ -42,15 +53,34 @@ impl Vm {
     /// # Errors
     /// As for every allocation.
     pub(crate) fn note_frames(&mut self, limit: usize) -> Result<Value, AllocError> {
-        let mut note = vec![self.scheduler.running.as_ref().map_or(Value::NIL, |task| first_code_of(task))];
-        for frame in self.frames().take(limit) {
+        let (note, words) = self.frames_to_note(limit);
+        self.exchange.charge(4 * note.len() + words * UNITS_PER_WORD);
+        self.heap.alloc_vector(&note)
+    }
+
+    /// Returns the items of a note, and the number of words of code that were read for it.
+    fn frames_to_note(&self, limit: usize) -> (Vec<Value>, usize) {
+        let first = self.scheduler.running.as_ref().map_or(Value::NIL, |task| first_code_of(task));
+        let mut note = vec![first];
+        let mut search = TailCallSearch::new(self);
+        let mut frames = self.frames().peekable();
+        while note.len() / 2 < limit
+            && let Some(frame) = frames.next()
+        {
             let Some(code) = self.heap.function_code(frame.function) else { continue };
             let header = self.heap.header(frame.function);
             let is_top_level = header.is_some_and(|header| header.aux == TOP_LEVEL);
-            note.extend([code, Value::index(2 * frame.place() as usize + usize::from(is_top_level))]);
+            let flags = if is_top_level { AT_TOP_LEVEL } else { 0 };
+            note.extend([code, frame_number(Some(frame.place() as usize), flags)]);
+            let called = match frames.peek() {
+                Some(caller) => search.named_by(caller),
+                None => Some(first),
+            };
+            for TailCaller { code, word } in search.between(called.unwrap_or(code), code) {
+                note.extend([code, frame_number(word, BY_TAIL_CALL)]);
+            }
         }
-        self.exchange.charge(4 * note.len());
-        self.heap.alloc_vector(&note)
+        (note, search.words)
     }
 
     /// Returns the frames of a note.
@@ -61,9 +91,12 @@ impl Vm {
             let code = self.heap.code(pair[0])?;
             Some(NotedFrame {
                 name: code.name,
-                is_top_level: number & 1 != 0,
-                place: self.names.source_place(&self.heap, pair[0], (number >> 1) as u32),
+                is_top_level: number & AT_TOP_LEVEL != 0,
+                place: (number >> FLAG_BITS)
+                    .checked_sub(1)
+                    .and_then(|word| self.names.source_place(&self.heap, pair[0], word as u32)),
                 is_of_library: is_of_library(code),
+                has_left: number & BY_TAIL_CALL != 0,
             })
         };
         items.get(1..).unwrap_or_default().chunks_exact(2).filter_map(read).collect()
@@ -89,7 +122,7 @@ impl Vm {
         let mut notes = vec![(task, history)];
         let mut history = history;
         while notes.len() < MOST_TASKS
-            && let Some(origin) = self.heap.as_cons(self.field_of_list(history, history::ORIGIN))
+            && let Some(origin) = self.heap.as_cons(self.field_of(history, history::ORIGIN))
         {
             notes.push((origin.car, origin.cdr));
             history = origin.cdr;
@@ -106,20 +139,22 @@ impl Vm {
                 },
                 place: frame.place,
                 is_of_library: frame.is_of_library,
+                has_left: frame.has_left,
             };
-            frames
-                .extend(self.noted_frames(self.field_of_list(history, history::FRAMES)).into_iter().map(row));
+            frames.extend(self.noted_frames(self.field_of(history, history::FRAMES)).into_iter().map(row));
         }
         frames.truncate(MOST_FRAMES);
         frames
     }
 
-    /// Returns a field of a record of the library that is a list; `NIL` if there is none.
-    fn field_of_list(&self, list: Value, index: usize) -> Value {
-        let mut rest = list;
-        for _ in 0..index {
-            rest = self.heap.as_cons(rest).map_or(Value::NIL, |pair| pair.cdr);
-        }
-        self.heap.as_cons(rest).map_or(Value::NIL, |pair| pair.car)
+    /// Returns a field of a history; `NIL` if there is none.
+    fn field_of(&self, history: Value, index: usize) -> Value {
+        let fields = self.heap.structure_slots(history).unwrap_or_default();
+        fields.get(index).copied().unwrap_or(Value::NIL)
     }
+}
+
+/// Returns the number of a frame in a note.
+fn frame_number(word: Option<usize>, flags: usize) -> Value {
+    Value::index(word.map_or(0, |word| word + 1) << FLAG_BITS | flags)
 }

@@ -8,6 +8,7 @@ mod label;
 mod observe;
 mod stand;
 mod survey;
+mod tail_calls;
 mod tasks;
 mod trace;
 mod variables;

@@ -90,6 +90,7 @@ fn failures_that_have_led_to_another_are_told() {
         "  in INNER, f.esl:1:17",
         "  in MIDDLE, f.esl:3:9",
         "  in OUTER, f.esl:4:24",
+        "  in (TASK ONE), f.esl:5:19 (tail call)",
         "In task TWO, made at f.esl:5:1:",
         "A failure of cause :STUCK with DRILL.",
         "  in (TASK TWO), f.esl:5:41",
@@ -99,7 +100,7 @@ fn failures_that_have_led_to_another_are_told() {
     assert_eq!(lines.len(), expected.len(), "{lines:#?}");
     assert_eq!(lines[1..], expected[1..], "{lines:#?}");
     let order = format!("{FUNCTIONS}(try-in-order (one (outer 1)) (two (list (fail :stuck 'drill))))");
-    let in_order = expected.map(|line| line.replace(":5:41", ":5:42"));
+    let in_order = expected.map(|line| line.replace(":5:41", ":5:42").replace(":5:19", ":5:20"));
     assert_eq!(report("in-order", &order, &[])[1..], in_order[1..]);
     let supervised =
         format!("{FUNCTIONS}(list (supervise (:restarts 1)\n  (one :backoff (0 1 0) (outer 1))))");
@@ -107,6 +108,112 @@ fn failures_that_have_led_to_another_are_told() {
     let told =
         ["In task ONE, made at f.esl:5:7:", "The value 5 is not of type LIST.", "  in INNER, f.esl:1:17"];
     assert_eq!(lines.windows(3).filter(|lines| *lines == told).count(), 2, "{lines:#?}");
+}
+
+/// A recovery procedure or a handler that fails tells where the failure began that it was called for.
+#[test]
+fn a_recovery_that_fails_keeps_the_calls_of_the_task() {
+    let net = "(list (task-net\n    (one (list (middle)))))";
+    let task = [
+        "  in INNER, f.esl:1:17",
+        "  in MIDDLE, f.esl:3:9",
+        "  in (TASK ONE), f.esl:8:16",
+        "  in task ONE, made at f.esl:7:9",
+        "  in top level, f.esl:7:9",
+        "Failure :OTHER, no recovery available.",
+        "Aborted",
+    ];
+    let procedure = format!(
+        "{FUNCTIONS}(defun recover () (fail :other))
+(with-recovery-procedures ((:type-error (list (recover)) (retry)))
+  {net})"
+    );
+    let lines = report("recovery", &procedure, &[]);
+    assert_eq!(lines[..2], ["A failure of cause :OTHER.", "  in RECOVER, f.esl:5:19"], "{lines:#?}");
+    let at = lines.iter().position(|line| line.starts_with("  while recovering from :TYPE-ERROR"));
+    assert_eq!(lines[at.expect("it was recovering") + 1..], task, "{lines:#?}");
+    let handler = format!(
+        "{FUNCTIONS}(defun recover () (fail :other))
+(handler-bind ((type-error (lambda (error) (list error (recover)))))
+  {net})"
+    );
+    let lines = report("handler", &handler, &[]);
+    let at = lines.iter().position(|line| line.starts_with("  while handling :TYPE-ERROR"));
+    assert_eq!(lines[at.expect("it was handling") + 1..], task, "{lines:#?}");
+}
+
+/// After a cleanup, too, a recovery procedure knows where the failure began.
+#[test]
+fn a_recovery_that_fails_keeps_the_calls_before_a_cleanup() {
+    let program = format!(
+        "{FUNCTIONS}(with-recovery-procedures ((:type-error (list (fail :other)) (retry)))
+  (list (with-cleanup-procedure (print 'off)
+    (list (outer 1)))))"
+    );
+    let lines = report("recovery-cleanup", &program, &[]);
+    let at = lines.iter().position(|line| line.starts_with("  while recovering from :TYPE-ERROR"));
+    let expected = ["  in INNER, f.esl:1:17", "  in MIDDLE, f.esl:3:9", "  in OUTER, f.esl:4:24"];
+    assert_eq!(lines[at.expect("it was recovering") + 1..][..3], expected, "{lines:#?}");
+    assert_eq!(lines.iter().filter(|line| line.contains("OUTER")).count(), 1, "{lines:#?}");
+}
+
+/// Functions that have left by a tail call are told, with the place of the call if there is only one.
+#[test]
+fn functions_that_have_left_by_a_tail_call_are_told() {
+    let of = |name: &str, program: &str| {
+        let mut lines = report(name, program, &[]);
+        lines.retain(|line| line.starts_with("  in ") && !line.starts_with("  in top level"));
+        lines
+    };
+    let chain = "(defun inner (x) (car x))
+(defun middle (x) (inner x))
+(defun outer (x) (if (> x 3) (middle x) (list x)))
+(list (outer 5))";
+    let expected = [
+        "  in INNER, f.esl:1:18",
+        "  in MIDDLE, f.esl:2:19 (tail call)",
+        "  in OUTER, f.esl:3:30 (tail call)",
+    ];
+    assert_eq!(of("tail", chain), expected);
+    // The same by machine code.
+    let loops = chain
+        .replace("(list (outer 5))", "(dotimes (i 9) (outer i))")
+        .replace("(car x)", "(car (if (> x 7) x nil))");
+    let mut lines = report("tail-native", &loops, &["--tier", "native"]);
+    lines.retain(|line| line.starts_with("  in "));
+    assert_eq!(lines[1..3], expected[1..], "{lines:#?}");
+    // Of two calls that may have led on, neither is claimed.
+    let two = "(defun inner (x) (car x))
+(defun outer (x) (if (> x 3) (inner x) (inner (- x))))
+(list (outer 5))";
+    assert_eq!(of("tail-two", two), ["  in INNER, f.esl:1:18", "  in OUTER (tail call)"]);
+    // A function that was called as a value has left from a known place, for an unknown one.
+    let value = "(defun inner (x) (car x))
+(defun between (x) (inner x))
+(defun outer (f x) (funcall f x))
+(list (outer #'between 5))";
+    assert_eq!(of("tail-value", value), ["  in INNER, f.esl:1:18", "  in OUTER, f.esl:3:20 (tail call)"]);
+    // Functions that do not lead to the failed one have not been there.
+    let redefined = "(defun inner (x) (car x))
+(defun outer (x) (inner x))
+(defun enter (x) (list (outer x)))
+(defun change (x) (eval '(defun outer (x) (list x))) (car x))
+(defun inner (x) (change x))
+(enter 5)";
+    let lines = of("tail-redefined", redefined);
+    assert!(
+        lines[0].starts_with("  in CHANGE, f.esl:4:") && lines[1].starts_with("  in ENTER"),
+        "{lines:#?}"
+    );
+    // The body of a task is the first of its functions.
+    let task = "(defun inner (x) (car x))
+(task-net (one (inner 5)))";
+    let lines = of("tail-task", task);
+    assert_eq!(
+        lines[..2],
+        ["  in INNER, f.esl:1:18", "  in (TASK ONE), f.esl:2:16 (tail call)"],
+        "{lines:#?}"
+    );
 }
 
 /// The failure of an operation of the program keeps the calls of its body.

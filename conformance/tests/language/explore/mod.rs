@@ -7,6 +7,7 @@ mod everywhere;
 mod fluents;
 mod keeping;
 mod oracle;
+mod origins;
 mod putting_back;
 mod resources;
 mod suspension;
