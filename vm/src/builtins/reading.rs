@@ -9,7 +9,7 @@ use crate::builtins::expect::optional;
 use crate::builtins::stream::{Then, more_input, skip_source, source};
 use crate::builtins::symbol::text_between;
 use crate::datum::Unit;
-use crate::environment;
+use crate::environment::{self, WrongFeature};
 use crate::equality::characters_of;
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
@@ -52,9 +52,31 @@ pub(super) fn read_datum(
     let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
     vm.exchange.charge(end.saturating_sub(start));
     match read {
-        Ok((Some(datum), end)) => Ok(ReadOutcome::Datum(datum, end)),
+        Ok((Some(datum), end)) => {
+            if text.get(start..end).is_some_and(asks_for_features) {
+                check_features(vm)?;
+            }
+            Ok(ReadOutcome::Datum(datum, end))
+        }
         Ok((None, _)) => Ok(ReadOutcome::End),
         Err(fault) => Ok(ReadOutcome::Fault(fault)),
+    }
+}
+
+/// Returns whether a text may ask for a feature.
+fn asks_for_features(text: &str) -> bool {
+    text.contains("#+") || text.contains("#-")
+}
+
+/// Fails if the value of `*features*` is not a list of symbols.
+fn check_features(vm: &mut Vm) -> Result<(), Exit> {
+    match vm.wrong_feature() {
+        None => Ok(()),
+        Some(WrongFeature::List(value)) => {
+            let variable = vm.names.known.features;
+            vm.exchange.raise(Raised::Variable(variable, value, Expected::Type("LIST")))
+        }
+        Some(WrongFeature::Item(item)) => vm.exchange.type_error(item, "SYMBOL"),
     }
 }
 

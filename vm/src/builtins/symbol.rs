@@ -155,6 +155,10 @@ pub(super) fn boundp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn makunbound(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let object = symbol_object(vm, arguments[0])?;
+    if vm.names.is_locked(&vm.heap, arguments[0]) {
+        let name = vm.describe(arguments[0]);
+        return vm.exchange.program_error(format!("{name} belongs to the language and keeps a value"));
+    }
     vm.set_symbol_value(object, Value::UNBOUND)?;
     Ok(arguments[0])
 }

@@ -20,8 +20,8 @@ use esl_bytecode::symbol::{
 
 pub(crate) use host::{macro_call, with_compiler};
 
-use crate::heap::Heap;
 use crate::heap::layout::SymbolObject;
+use crate::heap::{Heap, Kind};
 use crate::names::{Names, find_builtin};
 use crate::shape::{CodeKind, Shape};
 use crate::value::Value;
@@ -34,6 +34,31 @@ mod similar;
 
 /// Items of `*features*` that are looked at: the list may be circular.
 const MAX_FEATURES: usize = 1000;
+
+impl Vm {
+    /// Returns the value of `*features*`, or the item of it, that is not as it has to be: a list of symbols.
+    pub(crate) fn wrong_feature(&self) -> Option<WrongFeature> {
+        let features = self.symbol_value(self.names.known.features)?;
+        let mut rest = features;
+        for _ in 0..MAX_FEATURES {
+            let Some(pair) = self.heap.as_cons(rest) else { break };
+            let item = pair.car;
+            if !(item.is_nil() || item == Value::T || self.heap.is(item, Kind::Symbol)) {
+                return Some(WrongFeature::Item(item));
+            }
+            rest = pair.cdr;
+        }
+        (!rest.is_list()).then_some(WrongFeature::List(features))
+    }
+}
+
+/// A wrong value of `*features*`.
+pub(crate) enum WrongFeature {
+    /// The value is not a proper list.
+    List(Value),
+    /// An item of the list is not a symbol.
+    Item(Value),
+}
 
 impl Environment for Vm {
     fn global(&self, symbol: &Symbol) -> Global {
