@@ -182,8 +182,8 @@ fn host(arguments: Vec<String>, rights: Rights, is_virtual: bool, output: Option
     }
 }
 
-/// End of a replay: its exit status, if it was the same run; the difference, if it was another one; its output on
-/// both streams, and its ticks.
+/// End of a replay: its exit status, if it was the same run; the difference, if it was another one; its
+/// output on both streams, and its ticks.
 type ReplayRow = (Option<u8>, Option<String>, String, String, u64);
 
 /// Runs a recorded run again, to its end. Returns its exit status, if it was the same run; what differs, if

@@ -98,8 +98,8 @@ pub(crate) struct Unit {
     /// objects back.
     describe: Option<fn(&Heap, Value) -> String>,
     /// Whether the data come from the host, and no object has to be led back to its datum: then only nodes
-    /// that may occur twice are remembered, and a symbol denotes the one that its name has in its package, which
-    /// may be inherited.
+    /// that may occur twice are remembered, and a symbol denotes the one that its name has in its package,
+    /// which may be inherited.
     is_from_host: bool,
 }
 
