@@ -222,11 +222,14 @@ fn shared_and_circular_objects_are_seen_on_the_way_to_the_host() {
             _ => heap.alloc_vector(&[tree, tree, Value::NIL]).unwrap(),
         };
     }
-    let (datum, work) = export(&fixture.heap, &fixture.names, tree).unwrap();
+    let (datum, work) = export(&fixture.heap, &fixture.names, tree, |_, _| String::new()).unwrap();
     assert!(work < 1000, "{work}");
     let DatumKind::Vector(items) = datum.kind() else { panic!("{datum}") };
     assert!(items[0].is_same(&items[1]));
     let pair = fixture.heap.cons(Value::T, Value::NIL).unwrap();
     fixture.heap.set_cdr(pair, pair).unwrap();
-    assert_eq!(export(&fixture.heap, &fixture.names, pair).unwrap_err(), DatumError::Circular);
+    assert_eq!(
+        export(&fixture.heap, &fixture.names, pair, |_, _| String::new()).unwrap_err(),
+        DatumError::Circular
+    );
 }
