@@ -3,17 +3,17 @@
 //! The contract between this crate and the interpreter (`esl_vm`, module `interp::native`):
 //!
 //! * **N1, source.** The translated code is that of one function that has passed the verifier
-//! (`esl_bytecode::verify`, V1 to V14), at the address at which it stays. Its constants are read when the
-//! machine code runs, since some of them change; one that is a number stays the same. * **N2, frames.**
-//! Machine code is entered with the base of a frame of that function (F2 of the interpreter), at its first
-//! instruction or at one of its loop instructions. It reads and writes registers of that frame, and links and
-//! registers of frames that it makes above it, below [`NativeContext::limit`]. * **N3, truth.** Where machine
-//! code is left, and before it calls anything, all results are in the task's stack. So whatever the machine
-//! code leaves can be taken up by the interpreter, at the instruction that [`NativeContext::pc`] names in the
-//! frame [`NativeContext::base`]. Between, doubles may be *unspilled*: only in a register of the processor. A
-//! side exit saves them in [`NativeContext::doubles`]; [`NativeContext::unspilled`] names them by their
-//! distance from [`NativeContext::outer`], and the machine writes their words to the stack before anything
-//! else reads it.
+//!   (`esl_bytecode::verify`, V1 to V14), at the address at which it stays. Its constants are read when the
+//!   machine code runs, since some of them change; one that is a number stays the same.
+//! * **N2, frames.** Machine code is entered with the base of a frame of that function (F2 of the
+//!   interpreter), at its first instruction or at one of its loop instructions. It reads and writes registers
+//!   of that frame, and links and registers of frames that it makes above it, below [`NativeContext::limit`].
+//! * **N3, truth.** Where machine code is left, and before it calls anything, all results are in the task's
+//!   stack. So whatever the machine code leaves can be taken up by the interpreter, at the instruction that
+//!   [`NativeContext::pc`] names in the frame [`NativeContext::base`]. Between, doubles may be *unspilled*: only
+//!   in a register of the processor. A side exit saves them in [`NativeContext::doubles`];
+//!   [`NativeContext::unspilled`] names them by their distance from [`NativeContext::outer`], and the machine
+//!   writes their words to the stack before anything else reads it.
 //!   Where the function returns, they are dropped; other words without an address are in their places.
 //!   Functions of the machine that read no frame may be called while some are unspilled.
 //! * **N4, exits.** Machine code is left at the beginning of an instruction, before it has had any effect
