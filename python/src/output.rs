@@ -47,8 +47,11 @@ impl Output {
     }
 }
 
+/// The screen of a host.
+type Screen = Box<dyn FnMut(&[u8]) -> io::Result<()> + Send>;
+
 /// Returns the screen of a host that writes to a function.
-pub(crate) fn screen(mut output: Output) -> Box<dyn FnMut(&[u8]) -> io::Result<()> + Send> {
+pub(crate) fn screen(mut output: Output) -> Screen {
     Box::new(move |bytes| {
         output.write(bytes);
         Ok(())

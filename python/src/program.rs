@@ -190,7 +190,8 @@ type ReplayRow = (Option<u8>, Option<String>, String, String, u64);
 /// it was another one; its output on both streams, and its ticks.
 #[pyfunction]
 pub(crate) fn replay(py: Python<'_>, file: PathBuf) -> PyResult<ReplayRow> {
-    let replay = py.detach(|| esl_replay::replay(&file)).map_err(of_replay)?;
+    let replay =
+        py.detach(|| esl_replay::replay(&file).map_err(Box::new)).map_err(|error| of_replay(*error))?;
     let (status, difference) = match replay.replayed {
         Replayed::Equal(status) => (Some(status), None),
         Replayed::Cut => (None, None),
