@@ -85,7 +85,7 @@ pub enum Error {
     },
     /// The engine that was asked is gone.
     Ended,
-    /// The value has lists or vectors more than [`MAX_DEPTH`](crate::data::MAX_DEPTH) levels deep.
+    /// The value has lists or vectors more than [`MAX_DEPTH`] levels deep.
     NestedTooDeeply,
     /// The value cannot become [`Data`].
     NotData(ExportError),
