@@ -236,11 +236,10 @@ fn read_compiled(path: &Path) -> Result<Required, ModuleError> {
     Ok(Required::Compiled(Box::new(module)))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "world"))]
 mod tests {
     use super::*;
 
-    #[cfg(feature = "world")]
     #[test]
     fn a_misspelt_name_is_answered_with_the_one_that_may_be_meant() {
         let said =
@@ -251,7 +250,6 @@ mod tests {
         assert!(!said("no-such-module").contains("did you mean"));
     }
 
-    #[cfg(feature = "world")]
     #[test]
     fn a_module_of_a_feature_that_is_off_says_how_to_have_it() {
         let error = ModulePath::none().find("ros").expect_err("no crate has added it").to_string();

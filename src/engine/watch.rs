@@ -60,6 +60,7 @@ impl Engine {
     ///     let place = change.bindings.data("place").map(ToString::to_string);
     ///     drop(sender.send((change.is_there, place.unwrap_or_default())));
     /// })?;
+    /// engine.eval("(sleep 0)")?; // Changes are seen from this turn of the program on.
     /// engine.eval("(progn (assert '(at rover ridge)) (assert '(battery 90)) (retract '(at ? ?)))")?;
     /// engine.eval("(sleep 0.01)")?;
     /// drop(watch);
