@@ -44,9 +44,10 @@ impl Drop for FactWatch {
 }
 
 impl Engine {
-    /// Has `function` called for each change of a fact that matches a pattern, from the next turn on until
-    /// the watch is dropped, in the order of the changes. It is called on the thread that runs the engine,
-    /// between two turns of the program's tasks, and cannot call back. A panic in it ends the watch.
+    /// Calls `function` for each change of a fact that matches a pattern, in the order of the changes, until
+    /// the watch is dropped. The watch begins when the running engine takes its messages: an [`Engine::eval`]
+    /// that does not wait can end before. `function` is called on the thread that runs the engine, between
+    /// two turns of the program's tasks, and cannot call back. A panic in it ends the watch.
     ///
     /// ```
     /// use std::sync::mpsc::channel;
@@ -92,7 +93,7 @@ impl Engine {
         let question = Question::Call {
             function: FunctionRef::Named("ESL::%WATCH-FACTS".into()),
             arguments: handle::data([pattern.into(), Data::Symbol(name)]),
-            // It is there before a task that runs already changes a fact.
+            // Once it is taken, it begins before the other tasks go on.
             goes_first: true,
         };
         Ok(FactWatch(TaskHandle::begin(Sender::new(&self.machine.inbox()), question)))

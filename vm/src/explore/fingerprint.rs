@@ -427,7 +427,7 @@ impl Walk<'_> {
                     }
                 }
             }
-            // Where a failure began makes no difference, wherever that is noted.
+            // The place at which a failure began makes no difference.
             Kind::Structure if !self.is_strict && self.is_history(v) => {}
             Kind::Package | Kind::Class => self.digest.add_text(&vm.describe(v)),
             kind if kind.is_record() => {

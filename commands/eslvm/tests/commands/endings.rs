@@ -98,7 +98,7 @@ fn every_other_ending_runs_the_cleanups_too() {
     ];
     let folder = Folder::new("ways");
     for (way, options) in ways {
-        // Where every task waits for what cannot come, the motors do not keep the run going.
+        // When every task waits for an event that cannot come, the motors do not keep the run going.
         let motor =
             "(unwind-protect (wait-for-event (make-event)) (sleep 0.01) (format t \"~a is off~%\" name))";
         let program = format!(

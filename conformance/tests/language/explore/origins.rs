@@ -1,4 +1,4 @@
-//! Where a failure began is told in its report, and makes no state another one.
+//! Reports tell the place at which a failure began. States do not differ by it.
 
 use esl_testing::explore::{Grain, Settings, explore, explore_together};
 
