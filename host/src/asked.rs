@@ -83,9 +83,30 @@ impl Asked {
         arguments.iter().for_each(|argument| self.mix_datum(argument));
     }
 
-    /// Mixes in a datum: what most arguments are as it is, anything else as its text.
+    /// Mixes in a datum: its parts in the order of its text, rare ones as their text.
     fn mix_datum(&mut self, datum: &Datum) {
-        match datum.kind() {
+        let mut rest = Vec::new();
+        let mut next = Some(datum);
+        while let Some(datum) = next.take().or_else(|| rest.pop()) {
+            match datum.kind() {
+                DatumKind::Cons(car, cdr) => {
+                    self.canary.mix(9);
+                    rest.push(cdr);
+                    next = Some(car);
+                }
+                DatumKind::Vector(items) => {
+                    self.canary.mix(10);
+                    self.canary.mix(items.len() as u64);
+                    rest.extend(items.iter().rev());
+                }
+                kind => self.mix_atom(datum, kind),
+            }
+        }
+    }
+
+    /// Mixes in a datum of this kind, which is not compound.
+    fn mix_atom(&mut self, datum: &Datum, kind: &DatumKind) {
+        match kind {
             DatumKind::Nil => self.canary.mix(0),
             DatumKind::String(text) => {
                 self.canary.mix(1);
@@ -108,6 +129,16 @@ impl Asked {
             DatumKind::Packed(vector) => {
                 self.canary.mix(6);
                 self.canary.mix_bytes(&vector.to_le_bytes());
+            }
+            DatumKind::Float(number) => {
+                self.canary.mix(7);
+                // All values that are not numbers are written alike.
+                let number = if number.is_nan() { f64::NAN } else { *number };
+                self.canary.mix(number.to_bits());
+            }
+            DatumKind::Character(character) => {
+                self.canary.mix(8);
+                self.canary.mix(u64::from(u32::from(*character)));
             }
             _ => {
                 self.canary.mix(5);
@@ -276,6 +307,22 @@ mod tests {
     use crate::VirtualHost;
     use esl_bytecode::span::Span;
 
+    fn atom(kind: DatumKind) -> Datum {
+        Datum::new(kind, Span::default())
+    }
+
+    fn int(number: i64) -> Datum {
+        Datum::integer(number, Span::default())
+    }
+
+    fn list(items: Vec<Datum>) -> Datum {
+        Datum::list(items, Span::default())
+    }
+
+    fn begin_with(host: &mut Asked, argument: Datum) {
+        host.begin("b", &[argument], &mut |_| {});
+    }
+
     #[test]
     fn questions_and_arguments_count() {
         let canary = |ask: fn(&mut Asked)| {
@@ -304,9 +351,17 @@ mod tests {
             canary(|host| host.begin("b", &[Datum::integer(-1, Span::default())], &mut |_| {})),
             canary(|host| host.begin("b", &[Datum::string("", Span::default())], &mut |_| {})),
             canary(|host| host.begin("b", &[Datum::string("-1", Span::default())], &mut |_| {})),
-            canary(|host| {
-                host.begin("b", &[Datum::new(DatumKind::Float(-1.0), Span::default())], &mut |_| {})
-            }),
+            canary(|host| begin_with(host, atom(DatumKind::Float(-1.0)))),
+            canary(|host| begin_with(host, atom(DatumKind::Float(1.0)))),
+            canary(|host| begin_with(host, atom(DatumKind::Character('a')))),
+            canary(|host| begin_with(host, atom(DatumKind::Vector([].into())))),
+            // ((1) 2), ((1 2)), (1 (2)), (1 2) and (1 . 2)
+            canary(|host| begin_with(host, list(vec![list(vec![int(1)]), int(2)]))),
+            canary(|host| begin_with(host, list(vec![list(vec![int(1), int(2)])]))),
+            canary(|host| begin_with(host, list(vec![int(1), list(vec![int(2)])]))),
+            canary(|host| begin_with(host, list(vec![int(1), int(2)]))),
+            canary(|host| begin_with(host, Datum::cons(int(1), int(2), Span::default()))),
+            canary(|host| begin_with(host, atom(DatumKind::Vector([int(1), int(2)].into())))),
         ];
         for (i, one) in found.iter().enumerate() {
             assert!(!found[i + 1..].contains(one), "question {i}");

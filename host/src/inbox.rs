@@ -42,7 +42,7 @@ pub enum Incoming {
     /// A signal of an input of the program.
     Message {
         /// Name of the input, in upper case.
-        input: String,
+        input: Arc<str>,
         /// Arguments of the signal.
         arguments: Vec<Datum>,
     },

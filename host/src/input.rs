@@ -80,7 +80,7 @@ impl HostInput {
     }
 
     fn put(&self, arguments: Vec<Datum>) {
-        self.inbox.put(Incoming::Message { input: self.name.to_string(), arguments });
+        self.inbox.put(Incoming::Message { input: self.name.clone(), arguments });
     }
 }
 

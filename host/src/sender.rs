@@ -54,6 +54,8 @@ struct AdmissionTable {
     inputs: BTreeMap<String, InputAdmission>,
     /// Drivers that wait for room.
     wakers: Vec<Waker>,
+    /// Number of threads that wait for room. A notification without waiters is a call of the system too.
+    waiting: usize,
     is_closed: bool,
 }
 
@@ -105,12 +107,14 @@ impl Admission {
 
     /// Changes the table, and wakes all senders that wait for room.
     fn change_table(&self, change: impl FnOnce(&mut AdmissionTable)) {
-        let wakers = {
+        let (wakers, waiting) = {
             let mut table = self.state();
             change(&mut table);
-            std::mem::take(&mut table.wakers)
+            (std::mem::take(&mut table.wakers), table.waiting)
         };
-        self.room.notify_all();
+        if waiting > 0 {
+            self.room.notify_all();
+        }
         wakers.into_iter().for_each(Waker::wake);
     }
 
@@ -120,7 +124,9 @@ impl Admission {
         loop {
             match table.admit(name, None) {
                 Err(SendError::Full(_)) if waits => {
+                    table.waiting += 1;
                     table = self.room.wait(table).unwrap_or_else(PoisonError::into_inner);
+                    table.waiting -= 1;
                 }
                 admitted => return admitted,
             }
@@ -235,7 +241,7 @@ impl Sender {
     fn send(&self, input: &str, arguments: Vec<Datum>, waits: bool) -> Result<(), SendError> {
         let input = input.to_uppercase();
         self.inbox().admission().admit(&input, waits)?;
-        self.inbox().put(Incoming::Message { input, arguments });
+        self.inbox().put(Incoming::Message { input: input.into(), arguments });
         Ok(())
     }
 }

@@ -6,6 +6,8 @@
 //! Each row of the tables states a tag, the parts that follow it, and the value that they make, as a pattern
 //! for the writer and as an expression for the reader. So both have the same bytes.
 
+use std::sync::Arc;
+
 use esl_bytecode::datum::Datum;
 use esl_host::{
     FileAnswer, FunctionRef, HostError, HostFailure, Incoming, Input, News, NotedRecord, Permit,
@@ -53,6 +55,7 @@ packed_as! {
     i64: |number, out| out.signed(*number), |from| from.signed();
     bool: |flag, out| out.byte((*flag).into()), |from| from.flag();
     String: |text, out| out.text(text), |from| Some(from.text()?.into());
+    Arc<str>: |text, out| out.text(text), |from| Some(from.text()?.into());
     Datum: |datum, out| out.datum(datum), |from| from.datum();
     Vec<u8>: |bytes, out| out.bytes(bytes), |from| Some(from.bytes()?.into());
     Vec<String>: |items, out| out.list(items, |out, item| item.write(out)), |from| from.list(Packed::read);

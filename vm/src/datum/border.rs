@@ -59,13 +59,45 @@ pub(crate) fn import(
     names: &mut Names,
     datum: &Datum,
 ) -> Result<(Value, usize), AllocError> {
-    let mut unit = Unit { is_from_host: true, ..Unit::default() };
-    if datum.is_compound() {
-        return Ok((unit.value_of(heap, names, datum)?, unit.take_work() as usize));
+    let mut unit = Unit::of_host();
+    let value = unit.border_value(heap, names, datum)?;
+    let work = if datum.is_compound() { unit.take_work() as usize } else { work_of(datum) };
+    Ok((value, work))
+}
+
+/// Returns data as a list of values. A part that several of them have is one object.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn import_all(heap: &mut Heap, names: &mut Names, data: &[Datum]) -> Result<Value, AllocError> {
+    let mut unit = Unit::of_host();
+    let mut values = Vec::with_capacity(data.len());
+    for datum in data {
+        values.push(unit.border_value(heap, names, datum)?);
     }
-    let value = match datum.kind() {
-        DatumKind::String(text) => heap.alloc_str(text)?,
-        _ => unit.atom_value(heap, names, datum, false)?,
-    };
-    Ok((value, work_of(datum)))
+    heap.list(&values)
+}
+
+impl Unit {
+    /// Returns a unit for data that come from the host.
+    fn of_host() -> Unit {
+        Unit { is_from_host: true, ..Unit::default() }
+    }
+
+    /// Returns a datum that comes from the host as a value.
+    fn border_value(
+        &mut self,
+        heap: &mut Heap,
+        names: &mut Names,
+        datum: &Datum,
+    ) -> Result<Value, AllocError> {
+        if datum.is_compound() {
+            return self.value_of(heap, names, datum);
+        }
+        match datum.kind() {
+            // Another part may be the same text.
+            DatumKind::String(_) if datum.is_shared() => self.value_of(heap, names, datum),
+            _ => self.atom_value(heap, names, datum, false),
+        }
+    }
 }

@@ -34,7 +34,7 @@ use crate::names::{GivenMap, GivenSet, Names, RootMap};
 use crate::value::Value;
 
 use border::work_of;
-pub(crate) use border::{export, import};
+pub(crate) use border::{export, import, import_all};
 use environment::Environments;
 use parts::{are_parts, datum_with};
 pub(crate) use walk::DatumWalk;

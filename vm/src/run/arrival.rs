@@ -67,7 +67,7 @@ fn take_in_one(vm: &mut Vm, incoming: Incoming) -> bool {
         Incoming::Input => wake_readers(vm),
         Incoming::Output => wake_writers(vm),
         Incoming::Operation { number, news } => hear(vm, number, news),
-        Incoming::Message { input, arguments } => receive(vm, &input, arguments),
+        Incoming::Message { input, arguments } => receive(vm, &input, &arguments),
         Incoming::Question { number, question } => take_question(vm, number, question),
         Incoming::Abort(number) => abort_task(vm, TaskNumber(number)),
         Incoming::AbortCall(number) => abort_call(vm, number),
@@ -154,7 +154,7 @@ fn handle_signal(vm: &mut Vm, function: Value) {
 }
 
 /// Signals an input of the program, which knows it by this name.
-fn receive(vm: &mut Vm, name: &str, arguments: Vec<Datum>) {
+fn receive(vm: &mut Vm, name: &str, arguments: &[Datum]) {
     vm.outside.inbox.note_arrival(name);
     let Some(&input) = vm.outside.inputs.get(name) else { return };
     // A signal without its arguments would be another one.

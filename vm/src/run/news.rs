@@ -56,7 +56,7 @@ pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
     let (state, items) = match news {
         News::Progress(values) => {
             // The next progress comes as a whole again.
-            let Some(values) = import_list(vm, values) else { return };
+            let Some(values) = import_list(vm, &values) else { return };
             vm.heap.slot_set(handle, handle::PROGRESS, values);
             return signal(vm, handle);
         }
@@ -67,7 +67,7 @@ pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
             (known.failed, [vec![cause], failure.arguments].concat())
         }
     };
-    let (state, result) = match import_list(vm, items) {
+    let (state, result) = match import_list(vm, &items) {
         Some(list) => (state, list),
         None => {
             let cause = known.heap_exhausted;
@@ -81,11 +81,10 @@ pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
 }
 
 /// Returns data as a list of the heap; `None` if there is no room for it.
-pub(super) fn import_list(vm: &mut Vm, items: Vec<Datum>) -> Option<Value> {
-    let list = Datum::list(items, Span::default());
+pub(super) fn import_list(vm: &mut Vm, items: &[Datum]) -> Option<Value> {
     // A cons around it tells the empty list from a lack of room.
     let cell = allocate_without_retry(vm, |vm| {
-        let (list, _) = datum::import(&mut vm.heap, &mut vm.names, &list)?;
+        let list = datum::import_all(&mut vm.heap, &mut vm.names, items)?;
         Ok(vm.heap.cons(list, Value::NIL)?)
     });
     vm.heap.as_cons(cell).map(|cell| cell.car)
