@@ -36,6 +36,8 @@ mod slot;
 mod socket;
 #[cfg(feature = "tls")]
 mod tls;
+#[cfg(feature = "http")]
+mod tls_files;
 #[cfg(feature = "watch")]
 mod watch;
 #[cfg(feature = "http")]

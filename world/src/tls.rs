@@ -13,6 +13,7 @@ use tokio_rustls::client::TlsStream;
 use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::pki_types::pem::{self, PemObject};
 use tokio_rustls::rustls::pki_types::{CertificateDer, InvalidDnsNameError, PrivateKeyDer, ServerName};
+use tokio_rustls::rustls::server::{VerifierBuilderError, WebPkiClientVerifier};
 use tokio_rustls::rustls::{self, ClientConfig, RootCertStore, ServerConfig};
 use tokio_rustls::{TlsAcceptor, TlsConnector};
 
@@ -102,11 +103,31 @@ impl std::error::Error for PemFault {
     }
 }
 
+/// An identity of one's own: certificates, and the key that belongs to the first of them.
+type OwnIdentity = (Vec<CertificateDer<'static>>, PrivateKeyDer<'static>);
+
+/// Reads the certificates of one file, in PEM, and the key of another.
+fn read_identity(certificate: &Path, key: &Path) -> Result<OwnIdentity, TlsError> {
+    let chain = certificates(certificate).map_err(|fault| TlsError::Own(certificate.into(), fault))?;
+    let wrong_key = |fault| TlsError::Own(key.into(), fault);
+    let private = PrivateKeyDer::from_pem_file(key).map_err(|error| match error {
+        pem::Error::NoItemsFound => wrong_key(PemFault::NoKey),
+        error => wrong_key(PemFault::Unreadable(error)),
+    })?;
+    Ok((chain, private))
+}
+
 /// Returns what clients need that trust these certificates.
 fn config_with(roots: RootCertStore) -> Result<Arc<ClientConfig>, TlsError> {
+    Ok(Arc::new(builder_with(roots)?.with_no_client_auth()))
+}
+
+fn builder_with(
+    roots: RootCertStore,
+) -> Result<rustls::ConfigBuilder<ClientConfig, rustls::client::WantsClientCert>, TlsError> {
     let builder = ClientConfig::builder_with_provider(Arc::new(ring::default_provider()));
     let builder = builder.with_safe_default_protocol_versions().map_err(TlsError::Setup)?;
-    Ok(Arc::new(builder.with_root_certificates(roots).with_no_client_auth()))
+    Ok(builder.with_root_certificates(roots))
 }
 
 /// Returns what clients need that trust what the system trusts. It is read until it can be used.
@@ -115,14 +136,18 @@ fn config_of_system() -> Result<Arc<ClientConfig>, TlsError> {
     if let Some(config) = CONFIG.get() {
         return Ok(config.clone());
     }
+    let config = config_with(roots_of_system()?)?;
+    Ok(CONFIG.get_or_init(|| config).clone())
+}
+
+fn roots_of_system() -> Result<RootCertStore, TlsError> {
     let mut roots = RootCertStore::empty();
     let found = rustls_native_certs::load_native_certs();
     // Systems have some that are not well-formed; only none at all is a fault.
-    if roots.add_parsable_certificates(found.certs).0 == 0 {
-        return Err(TlsError::NothingTrusted);
+    match roots.add_parsable_certificates(found.certs).0 {
+        0 => Err(TlsError::NothingTrusted),
+        _ => Ok(roots),
     }
-    let config = config_with(roots)?;
-    Ok(CONFIG.get_or_init(|| config).clone())
 }
 
 /// Reads certificates of a file, in PEM.
@@ -134,12 +159,29 @@ fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, PemFault> {
 
 /// Returns what clients need that trust the certificates of a file, in PEM.
 fn config_of_file(path: &Path) -> Result<Arc<ClientConfig>, TlsError> {
+    config_with(roots_of_file(path)?)
+}
+
+fn roots_of_file(path: &Path) -> Result<RootCertStore, TlsError> {
     let refused = |fault| TlsError::Trusted(path.into(), fault);
     let mut roots = RootCertStore::empty();
     for certificate in certificates(path).map_err(refused)? {
         roots.add(certificate).map_err(|error| refused(PemFault::Refused(error)))?;
     }
-    config_with(roots)
+    Ok(roots)
+}
+
+/// Returns what clients need that have an identity of their own.
+#[cfg(feature = "http")]
+fn config_of_identity(
+    ca_file: Option<&Path>,
+    certificate: &Path,
+    key: &Path,
+) -> Result<Arc<ClientConfig>, TlsError> {
+    let builder = builder_with(ca_file.map_or_else(roots_of_system, roots_of_file)?)?;
+    let (chain, private) = read_identity(certificate, key)?;
+    let config = builder.with_client_auth_cert(chain, private);
+    Ok(Arc::new(config.map_err(|error| TlsError::Own(key.into(), PemFault::Refused(error)))?))
 }
 
 /// Returns what clients need that trust what the system trusts, or the certificates of a file.
@@ -151,23 +193,36 @@ pub(crate) async fn client_config(ca_file: Option<String>) -> Result<Arc<ClientC
     tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)
 }
 
-/// Reads the identity of a listener: the certificates in one file, in PEM, and the key in another.
-fn read_acceptor(certificate: &Path, key: &Path) -> Result<TlsAcceptor, TlsError> {
-    let chain = certificates(certificate).map_err(|fault| TlsError::Own(certificate.into(), fault))?;
-    let wrong_key = |fault| TlsError::Own(key.into(), fault);
-    let private = PrivateKeyDer::from_pem_file(key).map_err(|error| match error {
-        pem::Error::NoItemsFound => wrong_key(PemFault::NoKey),
-        error => wrong_key(PemFault::Unreadable(error)),
-    })?;
-    let builder = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()));
+/// Reads the identity of a listener: the certificates in one file, in PEM, and the key in another. With a
+/// file of `clients`, only clients are served that prove by these certificates who they are.
+fn read_acceptor(certificate: &Path, key: &Path, clients: Option<&Path>) -> Result<TlsAcceptor, TlsError> {
+    let (chain, private) = read_identity(certificate, key)?;
+    let provider = Arc::new(ring::default_provider());
+    let builder = ServerConfig::builder_with_provider(provider.clone());
     let builder = builder.with_safe_default_protocol_versions().map_err(TlsError::Setup)?;
-    let config = builder.with_no_client_auth().with_single_cert(chain, private);
-    Ok(TlsAcceptor::from(Arc::new(config.map_err(|error| wrong_key(PemFault::Refused(error)))?)))
+    let builder = match clients {
+        None => builder.with_no_client_auth(),
+        Some(path) => {
+            let roots = Arc::new(roots_of_file(path)?);
+            let verifier = WebPkiClientVerifier::builder_with_provider(roots, provider).build();
+            let refused = |error: VerifierBuilderError| rustls::Error::General(error.to_string());
+            let fault = |error| TlsError::Trusted(path.into(), PemFault::Refused(refused(error)));
+            builder.with_client_cert_verifier(verifier.map_err(fault)?)
+        }
+    };
+    let config = builder.with_single_cert(chain, private);
+    let wrong_key = |error| TlsError::Own(key.into(), PemFault::Refused(error));
+    Ok(TlsAcceptor::from(Arc::new(config.map_err(wrong_key)?)))
 }
 
 /// Returns the same, read in another thread.
-pub(crate) async fn acceptor(certificate: String, key: String) -> Result<TlsAcceptor, HostFailure> {
-    let load = move || read_acceptor(Path::new(&certificate), Path::new(&key));
+pub(crate) async fn acceptor(
+    certificate: String,
+    key: String,
+    clients: Option<String>,
+) -> Result<TlsAcceptor, HostFailure> {
+    let load =
+        move || read_acceptor(Path::new(&certificate), Path::new(&key), clients.as_deref().map(Path::new));
     tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)
 }
 
@@ -181,7 +236,7 @@ impl TlsIdentity {
     /// # Errors
     /// The fault in them.
     pub fn read(certificate: &Path, key: &Path) -> Result<TlsIdentity, TlsError> {
-        read_acceptor(certificate, key).map(TlsIdentity)
+        read_acceptor(certificate, key, None).map(TlsIdentity)
     }
 
     /// Begins TLS over a connection to a client.
@@ -226,4 +281,19 @@ pub(crate) async fn begin(
     ca_file: Option<String>,
 ) -> Result<TlsStream<TcpStream>, HostFailure> {
     connect(client_config(ca_file).await?, stream, name).await.map_err(tls_failure)
+}
+
+/// As [`begin`], for a client that may have an identity of its own.
+#[cfg(feature = "http")]
+pub(crate) async fn begin_as(
+    stream: TcpStream,
+    name: &str,
+    files: crate::tls_files::ClientFiles,
+) -> Result<TlsStream<TcpStream>, HostFailure> {
+    let Some((certificate, key)) = files.identity else { return begin(stream, name, files.trusted).await };
+    let load = move || {
+        config_of_identity(files.trusted.as_deref().map(Path::new), Path::new(&certificate), Path::new(&key))
+    };
+    let config = tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)?;
+    connect(config, stream, name).await.map_err(tls_failure)
 }

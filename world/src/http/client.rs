@@ -31,6 +31,7 @@ use crate::arrived::Arrived;
 use crate::operation::{ready_soon, spawned};
 use crate::slot::OpenSlot;
 use crate::socket::socket_failure;
+use crate::tls_files::ClientFiles;
 
 /// Most bytes that are handed to the program at a time.
 const MOST_AT_ONCE: usize = 1 << 16;
@@ -124,7 +125,7 @@ pub(super) fn add(rows: &mut HostRows) {
     rows.operation(
         spawned,
         "%HTTP-SEND",
-        ["request", "address", "method", "url", "headers", "body", "ca-file"],
+        ["request", "address", "method", "url", "headers", "body", "ca-file", "certificate", "key"],
         "Connects to ADDRESS and begins REQUEST. BODY is a text or bytes, NIL, or T if it comes in parts.",
         |slot: HostHandle<RequestSlot>,
          address: String,
@@ -132,20 +133,22 @@ pub(super) fn add(rows: &mut HostRows) {
          url: String,
          headers: Vec<(String, String)>,
          body: GivenBody,
-         ca_file: Option<String>| async move {
+         files: ClientFiles| async move {
             let url = target::parse(&url, None)?;
             let (body, parts) = body_of(body);
             let given = headers_of(headers)?;
             let takes_any_coding = given.contains_key(header::ACCEPT_ENCODING);
             let request = request(&method, &url, given, body)?;
-            let (answer, driver) = send(&address, &url, ca_file, request).await?;
+            let (answer, driver) = send(&address, &url, files, request).await?;
             let (parts, answer) = (tokio::sync::Mutex::new(parts), tokio::sync::Mutex::new(answer));
             let exchange = HttpExchange { _driver: driver, parts, answer, takes_any_coding };
             if slot.0.open(exchange) { Ok(()) } else { Err(is_over()) }
         },
     )
     .needs(Right::Net, "address")
-    .needs(Right::Read, "ca-file");
+    .needs(Right::Read, "ca-file")
+    .needs(Right::Read, "certificate")
+    .needs(Right::Read, "key");
     rows.operation(
         ready_soon,
         "%HTTP-SEND-PART",
@@ -175,10 +178,10 @@ pub(super) fn add(rows: &mut HostRows) {
 async fn send(
     address: &str,
     url: &Url,
-    ca_file: Option<String>,
+    files: ClientFiles,
     request: Request<RequestBody>,
 ) -> Result<(AnswerProgress, ConnectionDriver), HostFailure> {
-    let (mut sender, driver) = connect(address, url, ca_file).await?;
+    let (mut sender, driver) = connect(address, url, files).await?;
     let waiting = sender.send_request(request);
     Ok((AnswerProgress::Awaited(Box::pin(waiting), sender), driver))
 }
@@ -187,13 +190,13 @@ async fn send(
 pub(crate) async fn connect(
     address: &str,
     url: &Url,
-    ca_file: Option<String>,
+    files: ClientFiles,
 ) -> Result<(SendRequest<RequestBody>, ConnectionDriver), HostFailure> {
     let stream = connect_to(address).await?;
     // Requests are small, and are not to wait for more; without it they only take longer.
     drop(stream.set_nodelay(true));
     match url.scheme() {
-        "https" => begin_secured(stream, url, ca_file).await,
+        "https" => begin_secured(stream, url, files).await,
         _ => begin(stream).await,
     }
 }
@@ -299,16 +302,16 @@ async fn begin(
 async fn begin_secured(
     stream: TcpStream,
     url: &Url,
-    ca_file: Option<String>,
+    files: ClientFiles,
 ) -> Result<(SendRequest<RequestBody>, ConnectionDriver), HostFailure> {
-    begin(crate::tls::begin(stream, url.host_str().unwrap_or_default(), ca_file).await?).await
+    begin(crate::tls::begin_as(stream, url.host_str().unwrap_or_default(), files).await?).await
 }
 
 #[cfg(not(feature = "tls"))]
 async fn begin_secured(
     _stream: TcpStream,
     _url: &Url,
-    _ca_file: Option<String>,
+    _files: ClientFiles,
 ) -> Result<(SendRequest<RequestBody>, ConnectionDriver), HostFailure> {
     Err(HostFailure::new("TLS-ERROR", "this program was built without TLS"))
 }

@@ -125,16 +125,18 @@ pub(super) fn add(rows: &mut HostRows) {
     rows.operation(
         spawned,
         "%HTTP-LISTEN",
-        ["server", "input", "address", "most", "certificate", "key"],
+        ["server", "input", "address", "most", "certificate", "key", "clients"],
         "Makes SERVER listen at ADDRESS, for at MOST so many connections from one address; by TLS, if there are files of \
-         CERTIFICATE and KEY. Returns the port. The input with the name INPUT is signalled with each request: its \
+         CERTIFICATE and KEY, and only for clients that a certificate of the file CLIENTS proves, if there is one. \
+         Returns the port. The input with the name INPUT is signalled with each request: its \
          number, method, path, the parts of that, query, headers, body, a text if it is UTF-8, and bytes otherwise, \
          and whether it begins a connection of WebSocket; and with the number alone when the client of one has gone.",
         listen,
     )
     .needs(Right::Net, "address")
     .needs(Right::Read, "certificate")
-    .needs(Right::Read, "key");
+    .needs(Right::Read, "key")
+    .needs(Right::Read, "clients");
     rows.at_once(
         "%HTTP-ANSWER",
         ["server", "request", "status", "headers", "body"],
@@ -181,8 +183,9 @@ async fn listen(
     most: usize,
     certificate: Option<String>,
     key: Option<String>,
+    clients: Option<String>,
 ) -> Result<u16, HostFailure> {
-    let secured = Secured::read(certificate, key).await?;
+    let secured = Secured::read(certificate, key, clients).await?;
     let listener = bind(&address).await.map_err(|error| bind_failure(&error))?;
     let port = listener.local_addr().map_or(0, |address| address.port());
     let shared = Arc::new(ServerState {
@@ -208,17 +211,25 @@ struct Secured(#[cfg(feature = "tls")] Option<tokio_rustls::TlsAcceptor>);
 
 impl Secured {
     #[cfg(feature = "tls")]
-    async fn read(certificate: Option<String>, key: Option<String>) -> Result<Secured, HostFailure> {
+    async fn read(
+        certificate: Option<String>,
+        key: Option<String>,
+        clients: Option<String>,
+    ) -> Result<Secured, HostFailure> {
         match (certificate, key) {
             (Some(certificate), Some(key)) => {
-                Ok(Secured(Some(crate::tls::acceptor(certificate, key).await?)))
+                Ok(Secured(Some(crate::tls::acceptor(certificate, key, clients).await?)))
             }
             _ => Ok(Secured(None)),
         }
     }
 
     #[cfg(not(feature = "tls"))]
-    async fn read(certificate: Option<String>, _key: Option<String>) -> Result<Secured, HostFailure> {
+    async fn read(
+        certificate: Option<String>,
+        _key: Option<String>,
+        _clients: Option<String>,
+    ) -> Result<Secured, HostFailure> {
         match certificate {
             None => Ok(Secured()),
             Some(_) => Err(HostFailure::new("TLS-ERROR", "this program was built without TLS")),

@@ -61,9 +61,11 @@ pub(super) async fn listen(
     let listener = match secured {
         None => Listener::Tcp(listener),
         #[cfg(feature = "tls")]
-        Some((certificate, key)) => {
-            Listener::Secured(listener, crate::tls::acceptor(certificate, key).await?, Greetings::default())
-        }
+        Some((certificate, key)) => Listener::Secured(
+            listener,
+            crate::tls::acceptor(certificate, key, None).await?,
+            Greetings::default(),
+        ),
         #[cfg(not(feature = "tls"))]
         Some(_) => return Err(HostFailure::new("TLS-ERROR", "this program was built without TLS")),
     };

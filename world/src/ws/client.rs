@@ -17,6 +17,7 @@ use super::driver::FrameDriver;
 use super::{SocketLimits, ws_failure};
 use crate::event_loop;
 use crate::http::{self, RequestBody};
+use crate::tls_files::ClientFiles;
 
 /// Headers that are the handshake's own.
 const OF_THE_HANDSHAKE: [HeaderName; 6] = [
@@ -105,10 +106,10 @@ impl ClientHandshake {
         self,
         connection: &WsConnection,
         address: &str,
-        ca_file: Option<String>,
+        files: ClientFiles,
         limits: SocketLimits,
     ) -> Result<Option<String>, HostFailure> {
-        let (mut sender, driver) = http::connect(address, &self.url, ca_file).await.map_err(of_peer)?;
+        let (mut sender, driver) = http::connect(address, &self.url, files).await.map_err(of_peer)?;
         let answer = sender.send_request(self.request).await;
         let answer = answer.map_err(|error| of_peer(http::fault(&error)))?;
         let protocol = check(&answer, &self.key, &self.protocols)?;

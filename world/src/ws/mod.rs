@@ -24,6 +24,7 @@ use tokio_tungstenite::tungstenite::protocol::CloseFrame;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
 use crate::operation::{ready_soon, spawned};
+use crate::tls_files::ClientFiles;
 use client::ClientHandshake;
 use connection::WsConnection;
 pub(crate) use server::{Accepted, Handshake};
@@ -108,7 +109,10 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     rows.operation(
         spawned,
         "%WS-OPEN",
-        ["connection", "address", "url", "headers", "protocols", "largest", "keep-alive", "ca-file"],
+        [
+            "connection", "address", "url", "headers", "protocols", "largest", "keep-alive", "ca-file", "certificate",
+            "key",
+        ],
         "Opens CONNECTION to the server at ADDRESS. Returns the protocol of PROTOCOLS that it chooses, or NIL.",
         |connection: HostHandle<WsConnection>,
          address: String,
@@ -117,14 +121,16 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
          protocols: Vec<String>,
          largest: usize,
          keep_alive: Option<f64>,
-         ca_file: Option<String>| async move {
+         files: ClientFiles| async move {
             let limits = SocketLimits::new(largest, keep_alive)?;
             let handshake = ClientHandshake::new(&url, headers, protocols)?;
-            handshake.open(&connection, &address, ca_file, limits).await
+            handshake.open(&connection, &address, files, limits).await
         },
     )
     .needs(Right::Net, "address")
-    .needs(Right::Read, "ca-file");
+    .needs(Right::Read, "ca-file")
+    .needs(Right::Read, "certificate")
+    .needs(Right::Read, "key");
     rows.operation(
         spawned,
         "%WS-ACCEPT",
