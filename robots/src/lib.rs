@@ -53,6 +53,7 @@ pub const MODULES: &[HostModule] = &[
     HostModule { name: "ros", text: include_str!("../modules/ros.esl"), rows: ros::rows },
     HostModule { name: "ros-actions", text: include_str!("../modules/ros-actions.esl"), rows: HostRows::new },
     HostModule { name: "ros-bags", text: include_str!("../modules/ros-bags.esl"), rows: HostRows::new },
+    HostModule { name: "ros-bonds", text: include_str!("../modules/ros-bonds.esl"), rows: HostRows::new },
     HostModule { name: "ros-clock", text: include_str!("../modules/ros-clock.esl"), rows: HostRows::new },
     HostModule {
         name: "ros-diagnostics",
