@@ -8,6 +8,7 @@
 //! Not here: what a run is recorded as (`run`), and the clause `(:bag …)` of worlds of scripts, which is ESL.
 
 mod bag;
+mod batch;
 mod damage;
 mod decode;
 mod file;

@@ -255,6 +255,24 @@ impl McapOutput {
         ))
     }
 
+    /// Writes messages with their times, as [`McapOutput::write`] does, at once. Returns whether there is
+    /// room for more.
+    pub fn write_all(&self, channel: u16, messages: Vec<(u64, Bytes)>) -> bool {
+        let first = {
+            let mut channels = self.channels();
+            let Some(last) = channels.sequences.get_mut(usize::from(channel)) else { return true };
+            let first = last.wrapping_add(1);
+            // The numbers go round.
+            *last = last.wrapping_add(messages.len() as u32);
+            first
+        };
+        self.put_all(messages.into_iter().zip(0_u32..).map(|((time, payload), place)| {
+            let sequence = first.wrapping_add(place);
+            let header = MessageHeader { channel_id: channel, sequence, log_time: time, publish_time: time };
+            FilePart::Message(header, payload)
+        }))
+    }
+
     /// Writes an attachment. Returns whether there is room for more.
     pub fn attach(&self, name: String, media_type: String, time: u64, data: &Bytes) -> bool {
         let data = std::borrow::Cow::Owned(data.to_vec());
@@ -285,24 +303,31 @@ impl McapOutput {
     }
 
     fn put(&self, part: FilePart) -> bool {
+        self.put_all([part])
+    }
+
+    fn put_all(&self, parts: impl IntoIterator<Item = FilePart>) -> bool {
         if let PartTarget::Caller(writer) = &self.target {
-            let written = writer.lock().unwrap_or_else(PoisonError::into_inner).write(part);
+            let mut writer = writer.lock().unwrap_or_else(PoisonError::into_inner);
+            let written = parts.into_iter().try_for_each(|part| writer.write(part));
             if let Err(reason) = written {
                 self.queue.state().fault.get_or_insert(reason);
             }
             return true;
         }
         let mut state = self.queue.state();
-        let is_last = matches!(part, FilePart::Finish);
-        if state.fault.is_some() || state.is_finished && !is_last {
-            return true;
+        let was_empty = state.parts.is_empty();
+        for part in parts {
+            let is_last = matches!(part, FilePart::Finish);
+            if state.fault.is_some() || state.is_finished && !is_last {
+                return true;
+            }
+            state.is_hurried |= is_last || matches!(part, FilePart::Flush);
+            state.bytes += part.size();
+            state.parts.push(part);
+            state.put += 1;
         }
-        state.is_hurried |= is_last || matches!(part, FilePart::Flush);
-        let is_first = state.parts.is_empty();
-        state.bytes += part.size();
-        state.parts.push(part);
-        state.put += 1;
-        if is_first || state.is_hurried || state.bytes >= MOST_BYTES / 4 {
+        if was_empty || state.is_hurried || state.bytes >= MOST_BYTES / 4 {
             self.queue.work.notify_one();
         }
         state.bytes < MOST_BYTES

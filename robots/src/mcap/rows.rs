@@ -243,6 +243,15 @@ fn add_writing(rows: &mut HostRows) {
     )
     .everywhere();
     rows.at_once(
+        "%MCAP-WRITE-ALL",
+        ["file", "channel", "times", "messages"],
+        "Writes MESSAGES with TIMES, as many seconds. Returns whether there is room for more.",
+        |file: HostHandle<McapWriter>, channel: u16, times: Datum, messages: Datum| {
+            file.write_all(channel, &times, &messages)
+        },
+    )
+    .everywhere();
+    rows.at_once(
         "%MCAP-ATTACH",
         ["file", "name", "media-type", "time", "data"],
         "Writes an attachment. Returns whether there is room for more.",

@@ -9,6 +9,7 @@ use esl_bytecode::datum::Datum;
 use esl_host::{FromArgument, HostFailure, HostObject, Payload};
 use mcap::Compression;
 
+use super::batch;
 use super::output::{McapOutput, OutputChannel, OutputOptions};
 use super::reading::failure;
 use crate::message::{MessageType, Types, encode};
@@ -96,15 +97,45 @@ impl McapWriter {
         sequence: Option<u32>,
         message: &Datum,
     ) -> Result<bool, HostFailure> {
-        if let Some(reason) = self.output.fault() {
-            return Err(failure(reason));
+        let of_type = self.type_of(channel)?;
+        Ok(self.output.write(channel, times, sequence, payload(of_type.as_deref(), message)?))
+    }
+
+    /// Writes a list or a vector of messages, whose times are as many seconds: all, or none if one of them is
+    /// refused. Returns whether there is room for more.
+    pub(super) fn write_all(
+        &self,
+        channel: u16,
+        seconds: &Datum,
+        messages: &Datum,
+    ) -> Result<bool, HostFailure> {
+        let of_type = self.type_of(channel)?;
+        let (times, messages) = (batch::times(seconds)?, batch::items(messages)?);
+        if times.len() != messages.len() {
+            let counts = format!("found {} and {}", times.len(), messages.len());
+            return Err(failure(format!("expected as many times as messages, {counts}")));
         }
-        let of_type = self.types().get(&channel).cloned();
-        let payload = match of_type {
-            Some(of_type) => encode(&of_type, message)?,
-            None => Payload::from_argument(message)?.0,
-        };
-        Ok(self.output.write(channel, times, sequence, payload))
+        let mut parts = Vec::with_capacity(times.len());
+        for (time, message) in times.into_iter().zip(&messages) {
+            parts.push((time, payload(of_type.as_deref(), message)?));
+        }
+        Ok(self.output.write_all(channel, parts))
+    }
+
+    /// Returns the type of the messages of a channel of ROS 2.
+    fn type_of(&self, channel: u16) -> Result<Option<Arc<MessageType>>, HostFailure> {
+        match self.output.fault() {
+            Some(reason) => Err(failure(reason)),
+            None => Ok(self.types().get(&channel).cloned()),
+        }
+    }
+}
+
+/// Returns the payload of a message: of this type, or else bytes or a string.
+fn payload(of_type: Option<&MessageType>, message: &Datum) -> Result<Bytes, HostFailure> {
+    match of_type {
+        Some(of_type) => Ok(encode(of_type, message)?),
+        None => Ok(Payload::from_argument(message)?.0),
     }
 }
 
