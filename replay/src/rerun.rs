@@ -4,7 +4,7 @@ use std::fmt;
 
 use esl::Error;
 use esl::program::{self, Ended, Program, Schedule};
-use esl_host::{HostFailure, Output, ReplayHost, RunCheck};
+use esl_host::{Host, HostFailure, Output, ReplayHost, RunCheck};
 use esl_vm::embed::HostFunction;
 use esl_vm::explore::FollowedRun;
 use esl_vm::load::LoadError;
@@ -69,13 +69,26 @@ impl Rerun {
         recorded: &Recorded,
         screen: impl FnMut(Output, &[u8]) + Send + 'static,
     ) -> Result<Rerun, RerunError> {
+        Rerun::begin_within(recorded, screen, |host| Box::new(host))
+    }
+
+    /// As [`Rerun::begin`], with a host that `wrap` makes around the one that replays. It must ask that for
+    /// no more than the program asks for.
+    ///
+    /// # Errors
+    /// [`RerunError`].
+    pub fn begin_within(
+        recorded: &Recorded,
+        screen: impl FnMut(Output, &[u8]) + Send + 'static,
+        wrap: impl FnOnce(ReplayHost) -> Box<dyn Host + Send>,
+    ) -> Result<Rerun, RerunError> {
         let beginning = &recorded.beginning;
         if !is_own(&beginning.identity) {
             return Err(RerunError::Recording(RecordedError::OtherMachine));
         }
         let program = Program::from_bytes(&beginning.program).map_err(RerunError::Program)?;
         let host = ReplayHost::new(recorded.records.clone()).with_screen(screen);
-        let begun = begin(recorded, &program, host.clone());
+        let begun = begin(recorded, &program, wrap(host.clone()));
         // A world that has diverged has made the preparations fail.
         let (mut machine, main) = begun.map_err(|error| match host.divergence() {
             Some(_) => RerunError::Recording(RecordedError::Damaged {
@@ -182,9 +195,9 @@ impl Rerun {
 }
 
 /// Makes a machine for a recorded run, and begins the program in it.
-fn begin(recorded: &Recorded, program: &Program, host: ReplayHost) -> Result<(Vm, TaskId), Error> {
+fn begin(recorded: &Recorded, program: &Program, host: Box<dyn Host + Send>) -> Result<(Vm, TaskId), Error> {
     let beginning = &recorded.beginning;
-    let mut machine = program::machine(beginning.config.clone(), Box::new(host))?;
+    let mut machine = program::machine(beginning.config.clone(), host)?;
     if beginning.has_operators {
         program::load_operators(&mut machine)?;
     }

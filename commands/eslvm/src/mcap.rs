@@ -2,7 +2,7 @@
 //! such files, `eslvm mcap`.
 //!
 //! All belong to the feature `robots`; without it they are refused with what to type.
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
+#![allow(clippy::print_stderr, reason = "commands print")]
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -60,13 +60,15 @@ pub use without_robots::{McapHost, McapRecording};
 #[cfg(feature = "robots")]
 mod with_robots {
     use std::fs::File;
+    use std::io::Write;
     use std::sync::Arc;
     use std::time::Instant;
 
-    use esl::host::Host;
+    use esl::host::{Host, Record, ReplayHost, VIRTUAL_BEGINNING};
     use esl_command::{FAILED, SUCCESS};
+    use esl_replay::{Recorded, Rerun};
     use esl_robots::mcap::{McapBag, McapOutput, McapSelection, OutputOptions};
-    use esl_robots::run::{LiveServer, ObservedHost, RunRecorder, RunSink, RunSinks};
+    use esl_robots::run::{LiveServer, NoSink, ObservedHost, RunRecorder, RunSink, RunSinks};
 
     use super::{Path, PathBuf, RunFileOptions, USAGE, Vm, complain};
 
@@ -82,7 +84,72 @@ mod with_robots {
         begun: Option<Instant>,
     }
 
+    /// Ticks of a replay after which it is seen whether the program was told the time of day.
+    const PROBED: u64 = 10_000;
+
+    /// Creates a file of MCAP.
+    fn create(path: &Path) -> Result<Arc<McapOutput>, u8> {
+        let settings = OutputOptions { profile: "ros2".into(), ..OutputOptions::default() };
+        let output = File::create(path).and_then(|file| McapOutput::begin(file, &settings));
+        output.map(Arc::new).map_err(|error| {
+            complain(format_args!("{} cannot be written: {error}", path.display()));
+            USAGE
+        })
+    }
+
+    /// Returns the time at which a recorded run began, in nanoseconds since 1970, by the first time of day
+    /// that it was told; 0 if it was told none. `origin` is the same by the clock of the records.
+    fn start_of(recorded: &Recorded, origin: u64) -> u64 {
+        let mut elapsed = origin;
+        for noted in &*recorded.records {
+            match noted.record {
+                Record::Monotonic(time) => elapsed = time,
+                Record::WallClock(time) => {
+                    return u64::try_from(time).unwrap_or(0).saturating_sub(elapsed - origin);
+                }
+                Record::Virtual(true) => return u64::try_from(VIRTUAL_BEGINNING).unwrap_or(0),
+                _ => {}
+            }
+        }
+        // A function of the host may have told it, and a record does not name the function.
+        let probe = RunRecorder::begin(Arc::new(NoSink), 0);
+        probe.set_origin(origin);
+        let host = |host| -> Box<dyn Host + Send> { Box::new(ObservedHost::of_replay(host, probe.clone())) };
+        if let Ok(mut rerun) = Rerun::begin_within(recorded, |_, _| (), host) {
+            while probe.told_start().is_none() && rerun.run(PROBED).is_none() {}
+        }
+        probe.told_start().unwrap_or(0)
+    }
+
     impl McapRecording {
+        /// Creates a file of a run that is replayed.
+        ///
+        /// # Errors
+        /// The exit status, after a message.
+        pub fn of_replay(path: &Path, recorded: &Recorded) -> Result<McapRecording, u8> {
+            let output = create(path)?;
+            let times = recorded.records.iter().filter_map(|noted| match noted.record {
+                Record::Monotonic(time) => Some(time),
+                _ => None,
+            });
+            let origin = times.min().unwrap_or(0);
+            let recorder = RunRecorder::begin(output.clone(), start_of(recorded, origin));
+            recorder.set_origin(origin);
+            Ok(McapRecording { output: Some((output, path.to_owned())), live: None, recorder, begun: None })
+        }
+
+        /// Returns the host of a replay, whose answers are recorded.
+        pub fn host_of_replay(&self, host: ReplayHost) -> Box<dyn Host + Send> {
+            Box::new(ObservedHost::of_replay(host, self.recorder.clone()))
+        }
+
+        /// Records the machine of a replay from now on.
+        pub fn watch_replay(&self, rerun: &mut Rerun) {
+            let elapsed = rerun.host().clone().stopwatch();
+            self.recorder.set_delay(std::time::Duration::from_nanos(elapsed));
+            self.watch(rerun.machine_mut());
+        }
+
         /// Creates what was asked for, for a run of this program on this host; nothing if nothing was.
         ///
         /// # Errors
@@ -96,12 +163,7 @@ mod with_robots {
             let output = match &options.mcap {
                 None => None,
                 Some(path) => {
-                    let settings = OutputOptions { profile: "ros2".into(), ..OutputOptions::default() };
-                    let output = File::create(path).and_then(|file| McapOutput::begin(file, &settings));
-                    let output = output.map(Arc::new).map_err(|error| {
-                        complain(format_args!("{} cannot be written: {error}", path.display()));
-                        USAGE
-                    })?;
+                    let output = create(path)?;
                     sinks.push(output.clone());
                     Some((output, path.clone()))
                 }
@@ -177,7 +239,8 @@ mod with_robots {
                 return Err(refused(&fault));
             }
         }
-        print!("{bag}");
+        // Others may take a part of it only.
+        _ = write!(std::io::stdout().lock(), "{bag}");
         Ok(if bag.damage().is_empty() { SUCCESS } else { FAILED })
     }
 }
@@ -201,6 +264,22 @@ mod without_robots {
     }
 
     impl McapRecording {
+        /// Refuses what was asked for.
+        ///
+        /// # Errors
+        /// The exit status, after a message.
+        pub fn of_replay(_path: &Path, _recorded: &esl_replay::Recorded) -> Result<McapRecording, u8> {
+            Err(refuse("`--mcap`"))
+        }
+
+        /// Returns the host.
+        pub fn host_of_replay(&self, host: esl::host::ReplayHost) -> Box<dyn esl::host::Host + Send> {
+            Box::new(host)
+        }
+
+        /// Does nothing.
+        pub fn watch_replay(&self, _rerun: &mut esl_replay::Rerun) {}
+
         /// Refuses what was asked for.
         ///
         /// # Errors

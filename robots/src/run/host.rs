@@ -1,12 +1,13 @@
 //! A host that tells a recorder what comes from outside, which operations begin, and what is printed.
 
-use esl_bytecode::datum::Datum;
+use esl_bytecode::datum::{Datum, DatumKind};
 use esl_host::{
     Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, HostState, Inbox, Incoming, Input,
     Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
 };
 
 use super::recorder::RunRecorder;
+use super::topics::ReplayedTopics;
 
 /// A host whose requests a recorder hears.
 pub struct ObservedHost<H> {
@@ -14,19 +15,26 @@ pub struct ObservedHost<H> {
     recorder: RunRecorder,
     /// The monotonic clock at the beginning.
     start: u64,
+    /// Those of a run that is replayed. Such a host must not be asked more than the program asks.
+    topics: Option<ReplayedTopics>,
 }
 
 impl<H: Host> ObservedHost<H> {
     /// Tells `recorder` of the requests to `host`.
     pub fn new(mut host: H, recorder: RunRecorder) -> ObservedHost<H> {
         let start = host.monotonic();
-        ObservedHost { host, recorder, start }
+        ObservedHost { host, recorder, start, topics: None }
+    }
+
+    /// Tells `recorder` of the requests to `host`, which replays a run.
+    pub fn of_replay(host: H, recorder: RunRecorder) -> ObservedHost<H> {
+        ObservedHost { host, recorder, start: 0, topics: Some(ReplayedTopics::new()) }
     }
 
     /// Notes the time.
     fn note_time(&mut self) {
-        let since = self.host.monotonic().saturating_sub(self.start);
-        self.recorder.note_time(since);
+        let now = if self.topics.is_some() { self.host.stopwatch() } else { self.host.monotonic() };
+        self.recorder.note_time(now.saturating_sub(self.start));
     }
 }
 
@@ -132,12 +140,31 @@ impl<H: Host> Host for ObservedHost<H> {
         arguments: &[Datum],
         function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
-        self.host.call(name, arguments, function)
+        if let Some(topics) = &self.topics {
+            topics.note_call(name, arguments, |topic, of_type, payload| {
+                self.recorder.note_topic(topic, of_type, payload);
+            });
+        }
+        let answer = self.host.call(name, arguments, function);
+        if self.topics.is_some()
+            && name == "%TIME-NOW"
+            && let Ok(answer) = &answer
+            && let DatumKind::Float(seconds) = answer.kind()
+        {
+            self.note_time();
+            self.recorder.note_time_of_day(*seconds);
+        }
+        answer
     }
 
     fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
         self.note_time();
         self.recorder.note_operation(name, arguments);
+        if let Some(topics) = &mut self.topics {
+            topics.note_operation(name, arguments, |topic, of_type, payload| {
+                self.recorder.note_topic(topic, of_type, payload);
+            });
+        }
         self.host.begin(name, arguments, function);
     }
 
@@ -150,6 +177,13 @@ impl<H: Host> Host for ObservedHost<H> {
         if !arrivals.is_empty() {
             self.note_time();
             self.recorder.note_arrivals(&arrivals);
+            if let Some(topics) = &mut self.topics {
+                for arrival in &arrivals {
+                    topics.note_arrival(arrival, |topic, of_type, payload| {
+                        self.recorder.note_topic(topic, of_type, payload);
+                    });
+                }
+            }
         }
         arrivals
     }

@@ -11,6 +11,7 @@ mod live;
 mod log;
 mod recorder;
 mod tap;
+mod topics;
 
 pub use host::ObservedHost;
 pub use live::{LiveFault, LiveServer};
@@ -35,6 +36,17 @@ impl RunSink for crate::mcap::McapOutput {
     fn message(&self, channel: u16, time: u64, payload: esl_bytecode::Bytes) {
         self.write(channel, (time, time), None, payload);
     }
+}
+
+/// A sink that takes nothing.
+pub struct NoSink;
+
+impl RunSink for NoSink {
+    fn channel(&self, _channel: crate::mcap::OutputChannel) -> Option<u16> {
+        None
+    }
+
+    fn message(&self, _channel: u16, _time: u64, _payload: esl_bytecode::Bytes) {}
 }
 
 /// Sinks that take the same messages.

@@ -50,6 +50,10 @@ struct RecordedRun {
     latest: AtomicU64,
     /// Time of the first event that the machine tells, since the start.
     delay: AtomicU64,
+    /// Time at which a run that is replayed began, by the clock of its records.
+    origin: AtomicU64,
+    /// The start of a run that is replayed, by the first time of day that the program was told.
+    told: OnceLock<u64>,
     state: Mutex<RecorderState>,
 }
 
@@ -72,6 +76,8 @@ impl RunRecorder {
             start,
             latest: AtomicU64::new(0),
             delay: AtomicU64::new(0),
+            origin: AtomicU64::new(0),
+            told: OnceLock::new(),
             state: Mutex::default(),
         };
         let recorder = RunRecorder(Arc::new(recorder));
@@ -91,6 +97,23 @@ impl RunRecorder {
         }
     }
 
+    /// Notes that the run, which is replayed, began at this time of the clock of its records, in nanoseconds.
+    pub fn set_origin(&self, time: u64) {
+        self.0.origin.store(time, Ordering::Relaxed);
+    }
+
+    /// Notes the time of day that a program was told, in seconds since 1970.
+    pub(super) fn note_time_of_day(&self, seconds: f64) {
+        let told = (seconds.max(0.0) * 1e9) as u64;
+        self.0.told.get_or_init(|| told.saturating_sub(self.0.latest.load(Ordering::Relaxed)));
+    }
+
+    /// Returns the time at which a run that is replayed began, in nanoseconds since 1970, once the program
+    /// was told the time of day.
+    pub fn told_start(&self) -> Option<u64> {
+        self.0.told.get().copied()
+    }
+
     /// Notes that the machine counts its time from so long after the start on.
     pub fn set_delay(&self, delay: std::time::Duration) {
         self.0.delay.store(u64::try_from(delay.as_nanos()).unwrap_or(0), Ordering::Relaxed);
@@ -107,7 +130,8 @@ impl RunRecorder {
 
     /// Notes that the machine is so far, in nanoseconds since the start.
     pub(super) fn note_time(&self, time: u64) {
-        self.0.latest.fetch_max(time, Ordering::Relaxed);
+        let since = time.saturating_sub(self.0.origin.load(Ordering::Relaxed));
+        self.0.latest.fetch_max(since, Ordering::Relaxed);
     }
 
     fn note(&self, topic: &str, time: u64, make: impl FnOnce() -> OutputChannel, message: &Value) {

@@ -29,6 +29,9 @@ DEFINITIONS = {
         "byte level\nstring name\nstring message\nstring hardware_id\nKeyValue[] values",
     "diagnostic_msgs/msg/DiagnosticArray":
         "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status",
+    "bond/msg/Status":
+        "std_msgs/Header header\nstring id\nstring instance_id\nbool active\n"
+        "float32 heartbeat_timeout\nfloat32 heartbeat_period",
     "lifecycle_msgs/msg/State": "uint8 id\nstring label",
     "lifecycle_msgs/msg/Transition": "uint8 id\nstring label",
     "lifecycle_msgs/srv/ChangeState": "lifecycle_msgs/Transition transition\n---\nbool success",
@@ -107,6 +110,47 @@ def call(service, kind, **fields):
     return response
 
 
+class Bond:
+    """A bond with a managed node, as the lifecycle manager of Nav2 has it."""
+
+    def __init__(self, name):
+        self.name, self.instance, self.other = name, "manager", None
+        self.beats, self.is_alive = 0, True
+        self.subscription = ROS2Subscriber("/bond", "bond/msg/Status", node_name="manager", router_port=port,
+                                           callback=self.hear)
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def tell(self, is_alive):
+        header = get_message_class("std_msgs/msg/Header")(stamp=stamp(0, 0), frame_id="")
+        publish("/bond", "bond/msg/Status", header=header, id=self.name, instance_id=self.instance,
+                active=is_alive, heartbeat_timeout=4.0, heartbeat_period=0.25)
+
+    def run(self):
+        while self.is_alive:
+            self.tell(True)
+            time.sleep(0.25)
+
+    def hear(self, message):
+        if message.id != self.name or message.instance_id == self.instance:
+            return
+        if not message.active:
+            if self.other is not None:
+                self.other = None
+                say("bond ended")
+            return
+        self.beats += 1
+        if self.other != message.instance_id:
+            self.other = message.instance_id
+            say("bond formed")
+
+    def end(self):
+        self.is_alive = False
+        self.thread.join()
+        self.tell(False)
+
+
+bond = None
 subscriptions = []
 say("ready")
 for line in sys.stdin:
@@ -138,6 +182,15 @@ for line in sys.stdin:
             payload = reply.ok.payload.to_bytes()
             (length,) = struct.unpack_from("<I", payload, 8)
             say("state", payload[4], payload[12 : 11 + length].decode())
+    elif words[0] == "bond":
+        bond = Bond(words[1])
+        say("bonding")
+    elif words[0] == "beats":
+        before = bond.beats
+        time.sleep(2)
+        say("beats", "come" if bond.beats - before >= 4 else "are missing")
+    elif words[0] == "unbond":
+        bond.end()
     elif words[0] == "change":
         wanted = get_message_class("lifecycle_msgs/msg/Transition")(id=int(words[1]), label="")
         response = call("/executive/change_state", "lifecycle_msgs/srv/ChangeState", transition=wanted)

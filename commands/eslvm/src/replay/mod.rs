@@ -9,9 +9,11 @@ use std::str::FromStr;
 
 use clap::Args;
 use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain, refuse_overwriting};
-use esl_host::Output;
+use esl_host::{Host, Output, ReplayHost};
 use esl_replay::{Breakpoint, Recorded, RecordedError, Replayed, Rerun, RerunError, Target};
 use esl_timeline::Timeline;
+
+use crate::mcap::McapRecording;
 
 /// Options of a replay.
 #[derive(Args, Clone, Debug)]
@@ -29,6 +31,10 @@ pub struct ReplayOptions {
     /// Perfetto
     #[arg(long, value_name = "FILE", conflicts_with_all = ["until", "breakpoints"])]
     timeline: Option<PathBuf>,
+    /// Write the replay to a file of MCAP, as `eslvm run --mcap` writes a run. Needs a build with the cargo
+    /// feature `robots`
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["until", "breakpoints"])]
+    mcap: Option<PathBuf>,
     /// File of a recorded run
     #[arg(value_name = "FILE")]
     file: PathBuf,
@@ -55,16 +61,34 @@ pub fn run(options: &ReplayOptions) -> Result<u8, u8> {
             show(output, bytes);
         }
     };
-    let mut rerun = Rerun::begin(&recorded, screen).map_err(|error| refused(file, &error))?;
+    for output in [&options.timeline, &options.mcap].into_iter().flatten() {
+        refuse_overwriting(output, [file.as_path()])?;
+    }
+    let mcap = match &options.mcap {
+        Some(path) => Some(McapRecording::of_replay(path, &recorded)?),
+        None => None,
+    };
+    let host = |host: ReplayHost| -> Box<dyn Host + Send> {
+        match &mcap {
+            Some(mcap) => mcap.host_of_replay(host),
+            None => Box::new(host),
+        }
+    };
+    let mut rerun = Rerun::begin_within(&recorded, screen, host).map_err(|error| refused(file, &error))?;
+    if let Some(mcap) = &mcap {
+        mcap.watch_replay(&mut rerun);
+    }
     let mut timeline = None;
     if let Some(path) = &options.timeline {
-        refuse_overwriting(path, [file.as_path()])?;
         let begun = Timeline::begin(path, rerun.machine_mut()).map_err(|error| not_written(path, &error))?;
         timeline = Some((begun, path));
     }
     let replayed = rerun.run(u64::MAX).cloned().unwrap_or(Replayed::Cut);
     if let Some((timeline, path)) = timeline {
         timeline.end(rerun.machine_mut()).map_err(|error| not_written(path, &error))?;
+    }
+    if let Some(mcap) = mcap {
+        mcap.end(rerun.machine_mut())?;
     }
     let status = match &replayed {
         Replayed::Equal(status) => *status,

@@ -31,6 +31,8 @@ mod manual;
 mod mavlink;
 #[cfg(unix)]
 mod mcap;
+#[cfg(unix)]
+mod mcap_runs;
 mod memory;
 mod missions;
 mod modules;
@@ -38,6 +40,8 @@ mod monitor;
 #[cfg(unix)]
 mod mqtt;
 mod mqtt_messages;
+#[cfg(unix)]
+mod mutual_tls;
 mod operate;
 #[cfg(target_os = "linux")]
 mod packages;
@@ -54,6 +58,7 @@ mod replay;
 mod reports;
 mod rights;
 mod robots;
+mod robots_rude;
 mod robots_tools;
 #[cfg(unix)]
 mod secured;

@@ -33,12 +33,12 @@ fn peer(python: &Path, folder: &Folder, command: &str, path: &str) -> Vec<String
 }
 
 /// Runs a command in a folder.
-fn run(folder: &Folder, arguments: &[&str]) -> process::Finished {
+pub(crate) fn run(folder: &Folder, arguments: &[&str]) -> process::Finished {
     process::run(eslvm(arguments).current_dir(folder.path()), "")
 }
 
 /// Returns the lines of a text that have more than blanks.
-fn lines(text: &str) -> Vec<&str> {
+pub(crate) fn lines(text: &str) -> Vec<&str> {
     text.lines().map(str::trim).filter(|line| !line.is_empty()).collect()
 }
 
@@ -134,6 +134,72 @@ fn files_of_others_are_read_in_every_form() {
                 (:HEADER (:STAMP (:SEC 19 :NANOSEC 5) :FRAME-ID \"laser\") :RADIATION 4.75 :RANGES #(0.5 19.0))))";
     assert_eq!(lines(&done.output)[0], last, "{}", done.errors);
     assert_eq!(lines(&done.output)[1], "(\"/text\" (:DATA \"text 3\"))");
+}
+
+/// Writes messages in one step, and says what is refused.
+const BATCHES: &str = "(require :mcap)
+(mcap:with-file (file \"all.mcap\" :direction :output :profile \"ros2\")
+  (let ((battery (mcap:channel file \"/battery\" :type \"sensor_msgs/msg/BatteryState\"))
+        (state (mcap:channel file \"/state\" :json \"State\"))
+        (raw (mcap:channel file \"/raw\" :encoding \"text\")))
+    (flet ((refused (&rest arguments)
+             (format t \"~a~%\" (handler-case (apply #'mcap:write-all arguments)
+                                 (failure (f) (list (failure-cause f) (failure-arguments f)))
+                                 (error (e) (substitute #\\space #\\newline (princ-to-string e)))))))
+      (mcap:write raw \"before\" :time 1 :sequence 6)
+      (mcap:write-all raw (list \"a\" (coerce '(98 99) '(vector (unsigned-byte 8)))) #(2.5 3.25))
+      (mcap:write-all state (vector '(1 \"é\") 7) '(7/2 4))
+      (mcap:write-all battery '((:voltage 12) (:voltage 11)) (vector 5 5.5))
+      (mcap:write-all raw nil #())
+      (refused raw '(\"x\") '(9 9))
+      (refused raw '(\"x\" 7) '(9 9))
+      (refused raw \"xy\" '(9 9))
+      (refused battery '((:voltage 1) (:volts 2)) '(9 9))
+      (refused raw '(\"x\") '(1e300))
+      (refused raw '(\"x\") '(:now))
+      (mcap:write raw \"behind\" :time 6))))";
+
+#[test]
+fn messages_are_written_in_one_step_or_not_at_all() {
+    let Some(python) = python() else { return };
+    for clock in ["real", "virtual"] {
+        let folder = Folder::with(&format!("mcap-batches-{clock}"), &[("main.esl", BATCHES)]);
+        let done = run(&folder, &["run", "--clock", clock, "main.esl"]);
+        let said = lines(&done.output);
+        let expected = [
+            "(MCAP-ERROR (expected as many times as messages, found 2 and 1))",
+            "The value 7 is not of type VECTOR",
+            "The value \"xy\" is not of type SEQUENCE",
+            "(INVALID-MESSAGE ",
+            "(MCAP-ERROR (1e300 is not a time in seconds since 1970 that a file can hold))",
+            "The value :NOW is not of type REAL",
+        ];
+        assert_eq!((said.len(), done.status), (expected.len(), Some(0)), "{}{}", done.output, done.errors);
+        for (said, expected) in said.iter().zip(expected) {
+            assert!(said.starts_with(expected), "{said}");
+        }
+        let read = peer(&python, &folder, "read", "all.mcap");
+        let battery = |seconds: &str, number: u32, voltage: u32| {
+            format!(
+                "/battery sensor_msgs/msg/BatteryState {seconds} {seconds} {number} \
+                 {{header={{stamp={{sec=0 nanosec=0}} frame_id=}} voltage={voltage} "
+            )
+        };
+        let messages = &read[2..];
+        assert_eq!(
+            messages[..5],
+            [
+                "/raw - 1000000000 1000000000 6 before",
+                "/raw - 2500000000 2500000000 7 a",
+                "/raw - 3250000000 3250000000 8 bc",
+                "/state State 3500000000 3500000000 1 [1,\"é\"]",
+                "/state State 4000000000 4000000000 2 7",
+            ]
+        );
+        assert!(messages[5].starts_with(&battery("5000000000", 1, 12)), "{}", messages[5]);
+        assert!(messages[6].starts_with(&battery("5500000000", 2, 11)), "{}", messages[6]);
+        assert_eq!(messages[7..], ["/raw - 6000000000 6000000000 9 behind"]);
+    }
 }
 
 /// Tests against the bag that the peer writes.

@@ -188,3 +188,44 @@ fn a_node_is_managed_watched_and_followed_by_tools_in_python() {
     assert_eq!(program.line(), ":SHUTDOWN");
     assert_eq!(program.line(), ":MANAGED");
 }
+
+/// A managed node that the lifecycle manager of Nav2 watches.
+const BONDED: &str = "(ros:with-node (node \"executive\" :managed t :bond t :listen (address) :mode :router)
+  (spawn (:daemon t)
+    (loop (say (list :event (wait-for-event (ros:node-events node))))))
+  (ros:manage (node)
+    (:while-active (say :active) (sleep 1000))
+    (:on-shutdown (say :shutdown))))";
+
+#[test]
+fn a_manager_in_python_knows_that_a_node_is_alive() {
+    let Some(python) = python() else { return };
+    let folder = Folder::new("ros-bond");
+    let port = free_port();
+    let program = start_program(&folder, &format!("{SAY}{BONDED}"), port, &[]);
+    let mut peer = start_peer(&python, "robot.py", port);
+    let tell = |peer: &mut Running, line: &str, answers: &[&str]| {
+        peer.tell(line);
+        // Messages and answers overtake each other.
+        let mut awaited = answers.to_vec();
+        while !awaited.is_empty() {
+            let found = peer.line();
+            awaited.retain(|answer| *answer != found);
+        }
+    };
+    tell(&mut peer, "bond executive", &["bonding"]);
+    tell(&mut peer, "change 1", &["changed True"]);
+    tell(&mut peer, "change 3", &["bond formed", "changed True"]);
+    assert_eq!(program.line(), ":ACTIVE");
+    tell(&mut peer, "beats", &["beats come"]);
+    // The end of a bond that the manager has asked for is not an event.
+    tell(&mut peer, "change 4", &["bond ended", "changed True"]);
+    tell(&mut peer, "change 3", &["bond formed", "changed True"]);
+    assert_eq!(program.line(), ":ACTIVE");
+    // The node has heard of the manager by then.
+    tell(&mut peer, "beats", &["beats come"]);
+    tell(&mut peer, "unbond", &["bond ended"]);
+    assert_eq!(program.line(), "(:EVENT :BOND-BROKEN)");
+    tell(&mut peer, "change 7", &["changed True"]);
+    assert_eq!(program.line(), ":SHUTDOWN");
+}
