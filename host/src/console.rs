@@ -198,25 +198,37 @@ impl Console {
         }
     }
 
-    /// Takes the next line of standard input without its line end, and whether the line end was missing.
-    pub fn read_line(&mut self, host: &mut dyn Host) -> Taken<(Vec<u32>, bool)> {
+    /// Waits for the end of a line of at most `limit` characters, or of the input. Returns whether it has
+    /// arrived; otherwise that many characters have.
+    pub fn await_line(&mut self, host: &mut dyn Host, limit: usize) -> Taken<bool> {
         let mut searched = 0;
         loop {
-            let end = self.input.iter().skip(searched).position(|&c| c == u32::from('\n'));
-            if let Some(end) = end.map(|end| searched + end) {
-                let line = self.input.drain(..end).collect();
-                self.input.pop_front();
-                return Taken::Next((line, false));
+            if self.input.iter().take(limit).skip(searched).any(|&c| c == u32::from('\n')) {
+                return Taken::Next(true);
             }
             searched = self.input.len();
+            if searched >= limit {
+                return Taken::Next(false);
+            }
             match self.fill(host) {
                 Taken::Next(()) => {}
                 Taken::WouldBlock => return Taken::WouldBlock,
                 Taken::End if self.input.is_empty() => return Taken::End,
-                Taken::End => return Taken::Next((self.input.drain(..).collect(), true)),
+                Taken::End => return Taken::Next(true),
                 Taken::Failed(error) => return Taken::Failed(error),
             }
         }
+    }
+
+    /// Takes the characters that have arrived up to the end of a line, at most `limit`, and returns whether the
+    /// line has ended with them.
+    pub fn take_line(&mut self, limit: usize) -> (Vec<u32>, bool) {
+        let end = self.input.iter().take(limit).position(|&c| c == u32::from('\n'));
+        let line = self.input.drain(..end.unwrap_or_else(|| limit.min(self.input.len()))).collect();
+        if end.is_some() {
+            self.input.pop_front();
+        }
+        (line, end.is_some())
     }
 
     /// Returns whether the input has ended.
@@ -247,9 +259,9 @@ impl Console {
         self.input.push_front(character);
     }
 
-    /// Puts a line back in front of the input.
-    pub fn unread_line(&mut self, line: &[u32], is_cut: bool) {
-        if !is_cut {
+    /// Puts back what [`Console::take_line`] has returned.
+    pub fn unread_line(&mut self, line: &[u32], has_ended: bool) {
+        if has_ended {
             self.unread(u32::from('\n'));
         }
         line.iter().rev().for_each(|&character| self.unread(character));
@@ -371,11 +383,27 @@ mod tests {
         let mut host = VirtualHost::new().with_input("one\ntw").with_input("o\n\nend");
         let mut console = Console::default();
         let mut lines = Vec::new();
-        while let Taken::Next((line, is_cut)) = console.read_line(&mut host) {
-            lines.push((String::from_iter(line.iter().map(|&c| char::from_u32(c).unwrap())), is_cut));
+        while let Taken::Next(true) = console.await_line(&mut host, 3) {
+            let (line, has_ended) = console.take_line(3);
+            lines.push((String::from_iter(line.iter().map(|&c| char::from_u32(c).unwrap())), has_ended));
         }
-        let expected = [("one", false), ("two", false), ("", false), ("end", true)];
-        assert_eq!(lines, expected.map(|(line, is_cut)| (line.to_owned(), is_cut)));
+        let expected = [("one", true), ("two", true), ("", true), ("end", false)];
+        assert_eq!(lines, expected.map(|(line, has_ended)| (line.to_owned(), has_ended)));
+    }
+
+    #[test]
+    fn a_long_line_is_taken_in_pieces() {
+        let mut host = VirtualHost::new().with_input("abc").with_input("de\nf\n");
+        let mut console = Console::default();
+        assert_eq!(console.await_line(&mut host, 4), Taken::Next(false));
+        assert_eq!(console.take_line(4), (codes("abcd"), false));
+        console.unread_line(&codes("abcd"), false);
+        assert_eq!(console.take_line(4), (codes("abcd"), false));
+        assert_eq!(console.take_line(4), (codes("e"), true));
+        console.unread_line(&codes("e"), true);
+        assert_eq!(console.await_line(&mut host, 4), Taken::Next(true));
+        assert_eq!(console.take_line(4), (codes("e"), true));
+        assert_eq!(console.take_line(4), (codes("f"), true));
     }
 
     #[test]

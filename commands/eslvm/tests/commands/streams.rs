@@ -333,6 +333,22 @@ fn a_limit_that_ends_reading_a_datum_of_standard_input_leaves_it_there() {
     assert_eq!(lines_of(&running.output()), [":TIMEOUT", "((1 2 3) \"rest\")"]);
 }
 
+#[test]
+fn a_line_of_standard_input_is_long_but_not_endless() {
+    let text = "(print (length (read-line)))
+(print (read-line))
+(print (handler-case (read-line) (failure (failure) (failure-cause failure))))";
+    let folder = Folder::with("long-input", &[("main.esl", text)]);
+    let mut command = eslvm(&["run", "main.esl"]);
+    command.current_dir(folder.path()).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut running = Running { child: command.spawn().expect("the command is there"), folder };
+    let mut input = running.child.stdin.take().expect("it is piped");
+    let endless = "y".repeat((1 << 24) + 1);
+    input.write_all(format!("{}\nshort\n{endless}", "x".repeat(3_000_000)).as_bytes()).expect("it is read");
+    drop(input);
+    assert_eq!(lines_of(&running.output()), ["3000000", "\"short\"", ":LINE-TOO-LONG"]);
+}
+
 /// Returns the lines of an output that are not empty, without blanks around them.
 fn lines_of(output: &str) -> Vec<&str> {
     output.lines().map(str::trim).filter(|line| !line.is_empty()).collect()

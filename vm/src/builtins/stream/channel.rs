@@ -94,20 +94,6 @@ pub(in crate::builtins) fn channel_state(vm: &mut Vm, arguments: &[Value]) -> Ou
     vm.give_values(&[Value::index(count), Value::boolean(has_line), Value::boolean(is_at_end)])
 }
 
-/// `(%channel-piece channel)`
-pub(in crate::builtins) fn channel_piece(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let channel = expect_channel(vm, arguments[0])?;
-    let (start, end) =
-        (stream_index(&vm.heap, channel, slot::POSITION), stream_index(&vm.heap, channel, slot::END));
-    let buffer = stream_slot(&vm.heap, channel, slot::BUFFER);
-    let end = end.min(start + COPY_LIMIT);
-    let piece = vm.heap.string(buffer).and_then(|all| all.get(start..end)).unwrap_or_default().to_vec();
-    vm.exchange.charge_elements(piece.len());
-    let text = vm.heap.alloc_string(&piece)?;
-    set_stream_slot(&mut vm.heap, channel, slot::POSITION, Value::index(start + piece.len()));
-    Ok(text)
-}
-
 /// `(%supply-channel channel text)`
 pub(in crate::builtins) fn supply_channel(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [channel, text] = exactly(arguments);

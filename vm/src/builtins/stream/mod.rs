@@ -30,10 +30,10 @@ mod text;
 mod write;
 
 pub(super) use channel::{
-    channel_handler, channel_output, channel_piece, channel_state, make_channel, supply_channel,
+    channel_handler, channel_output, channel_state, make_channel, supply_channel,
 };
 pub(super) use file::{delete_file, file_bytes, file_error, file_exists_p, file_text, right_to, write_bytes};
-pub(super) use read::{listen, peek_char, read_char, read_char_no_hang, read_line, unread_char};
+pub(super) use read::{line_piece, listen, peek_char, read_char, read_char_no_hang, read_line, unread_char};
 pub(super) use text::{
     gathered_length, get_output_stream_string, make_string_input, make_string_output, read_from_copy,
     set_string_input_position, string_input_position, take_gathered,

@@ -77,17 +77,14 @@ pub(in crate::builtins) fn unread_char(vm: &mut Vm, arguments: &[Value]) -> Outc
 pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (stream, kind) = designated_stream(vm, optional(arguments, 0), true)?;
     let (line, is_cut) = if kind == StreamKind::StandardInput {
-        let taken = vm.outside.console.read_line(&mut vm.outside.host);
-        let Some((line, is_cut)) = input_of(vm, taken)? else { return end_of_line(vm, stream, arguments) };
-        vm.exchange.charge_elements(line.len());
-        match vm.heap.alloc_string(&line) {
-            Ok(text) => (text, is_cut),
-            Err(error) => {
-                // The builtin will be done again.
-                vm.outside.console.unread_line(&line, is_cut);
-                return Err(error.into());
-            }
+        let taken = vm.outside.console.await_line(&mut vm.outside.host, COPY_LIMIT);
+        match input_of(vm, taken)? {
+            Some(true) => {}
+            Some(false) => return Err(Exit::Slowly),
+            None => return end_of_line(vm, stream, arguments),
         }
+        let (line, has_ended) = console_line(vm)?;
+        (line, !has_ended)
     } else {
         let (start, end) =
             (stream_index(&vm.heap, stream, slot::POSITION), stream_index(&vm.heap, stream, slot::END));
@@ -109,6 +106,48 @@ pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcom
         (text, length.is_none())
     };
     vm.give_values(&[line, Value::boolean(is_cut)])
+}
+
+/// Returns what has arrived of a line of standard input, at most [`COPY_LIMIT`] characters, as a string, and
+/// whether the line has ended with it.
+fn console_line(vm: &mut Vm) -> Result<(Value, bool), Exit> {
+    let (line, has_ended) = vm.outside.console.take_line(COPY_LIMIT);
+    vm.exchange.charge_elements(line.len());
+    match vm.heap.alloc_string(&line) {
+        Ok(text) => Ok((text, has_ended)),
+        Err(error) => {
+            // The builtin will be done again.
+            vm.outside.console.unread_line(&line, has_ended);
+            Err(error.into())
+        }
+    }
+}
+
+/// `(%line-piece stream)`
+pub(in crate::builtins) fn line_piece(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, kind) = designated_stream(vm, arguments[0], true)?;
+    let (piece, has_ended, is_last) = if kind == StreamKind::StandardInput {
+        // At most one character: whatever has arrived will do.
+        let taken = vm.outside.console.await_line(&mut vm.outside.host, 1);
+        let is_last = input_of(vm, taken)?.is_none();
+        let (piece, has_ended) = console_line(vm)?;
+        (piece, has_ended, is_last)
+    } else {
+        let (start, end) =
+            (stream_index(&vm.heap, stream, slot::POSITION), stream_index(&vm.heap, stream, slot::END));
+        let buffer = stream_slot(&vm.heap, stream, slot::BUFFER);
+        let rest = vm.heap.string(buffer).and_then(|all| all.get(start..end)).unwrap_or_default();
+        let piece = &rest[..rest.len().min(COPY_LIMIT)];
+        let line_end = piece.iter().position(|&c| c == u32::from('\n'));
+        let piece = piece[..line_end.unwrap_or(piece.len())].to_vec();
+        let is_last = piece.is_empty() && line_end.is_none() && !channel::may_go_on(&vm.heap, stream, kind);
+        vm.exchange.charge_elements(piece.len());
+        let text = vm.heap.alloc_string(&piece)?;
+        let next = start + piece.len() + usize::from(line_end.is_some());
+        set_stream_slot(&mut vm.heap, stream, slot::POSITION, Value::index(next));
+        (text, line_end.is_some(), is_last)
+    };
+    vm.give_values(&[piece, Value::boolean(has_ended), Value::boolean(is_last)])
 }
 
 fn end_of_line(vm: &mut Vm, stream: Value, arguments: &[Value]) -> Outcome {
