@@ -604,6 +604,15 @@ struct settings {
     std::optional<recording> replayed = std::nullopt;
 };
 
+// A watch over facts, until it is destroyed.
+class watch {
+public:
+    explicit watch(esl_watch *owned) : object(owned) {}
+
+private:
+    owner<esl_watch, esl_watch_free> object;
+};
+
 // A machine in which programs run. It serves one thread at a time.
 class engine {
 public:
@@ -699,6 +708,40 @@ public:
         esl_failure *thrown = nullptr;
         require(esl_poll(object.get(), ticks, &progress, &thrown), thrown);
         return progress;
+    }
+    // Makes the definitions of a text in the program, all at once or none of them. Returns their number.
+    std::size_t patch(const std::string &text, const std::string &name = "patch") {
+        std::size_t count = 0;
+        esl_failure *thrown = nullptr;
+        require(esl_patch(object.get(), name.c_str(), text.c_str(), &count, &thrown), thrown);
+        return count;
+    }
+    // Takes the newest patch back. Returns the number of its definitions; 0 if there is no patch.
+    std::size_t undo_patch() {
+        std::size_t count = 0;
+        esl_failure *thrown = nullptr;
+        require(esl_undo_patch(object.get(), &count, &thrown), thrown);
+        return count;
+    }
+    // The definitions of a package: property lists with kind, name, parameters and documentation.
+    value definitions(const std::string &package = "esl-user") { return evaluate(esl_definitions, package); }
+    // Has function(bool is_there, esl::value fact, esl::value bindings) called for each change of a fact that
+    // matches a pattern, on the thread of the engine, until the watch is destroyed.
+    template <typename F>
+    esl::watch watch_facts(const value &pattern, F function) {
+        auto tell = [](void *user, bool is_there, const esl_value *fact, const esl_value *bindings) {
+            try {
+                (*static_cast<F *>(user))(is_there, value::copy(fact), value::copy(bindings));
+            } catch (...) {
+                // Nothing waits for it, and the run goes on.
+            }
+        };
+        esl_watch *result = nullptr;
+        esl_failure *thrown = nullptr;
+        require(esl_watch_facts(object.get(), pattern.get(), tell, new F(std::move(function)), destroy<F>, &result,
+                                &thrown),
+                thrown);
+        return esl::watch(result);
     }
     // What was recorded so far.
     esl::recording recording() const {

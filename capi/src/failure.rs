@@ -3,7 +3,7 @@
 use std::ffi::{CString, c_char};
 use std::ptr;
 
-use esl::Error;
+use esl::{Data, Error};
 use esl::engine::Failure;
 use esl::host::{FailureFrame, SendError};
 
@@ -83,6 +83,9 @@ impl Fault {
 impl From<Error> for Fault {
     fn from(error: Error) -> Fault {
         let mut fault = Fault::new(esl_status::of_error(&error), error.to_string());
+        if let Error::Exited(status) = error {
+            fault.0.arguments = vec![esl_value(Data::Integer(status.into()))];
+        }
         if let Error::Failed { cause, report, arguments, frames, .. } = error {
             fault.0.cause = c_text(cause);
             fault.0.report = c_text(report);

@@ -6,6 +6,7 @@
 //! | `status`, `failure` | the outcome of a call, and its reason |
 //! | `value`, `json`, `object` | values of programs; their texts in JSON; objects of C among them |
 //! | `config`, `engine` | engines: limits, rights, evaluation, the loop |
+//! | `program` | definitions of a program, patches, watched facts |
 //! | `function`, `operation` | functions and operations that C implements |
 //! | `handle`, `reply` | other threads, and answers to come |
 //! | `observer`, `recording` | watching a run; recording and replaying it |
@@ -32,6 +33,7 @@ pub mod json;
 pub mod object;
 pub mod observer;
 pub mod operation;
+pub mod program;
 pub mod recording;
 pub mod reply;
 pub mod status;

@@ -39,6 +39,8 @@ pub enum esl_status {
     ESL_FULL = 13,
     /// The engine is gone.
     ESL_ENDED = 14,
+    /// The program has asked to end; the argument of the failure is the status.
+    ESL_PROGRAM_EXITED = 16,
     /// A fault of ESL itself. The message has what to report.
     ESL_PANIC = 15,
 }
@@ -59,6 +61,7 @@ impl esl_status {
             Error::NotOfType { .. } | Error::NotData(_) | Error::NestedTooDeeply => ESL_NOT_OF_TYPE,
             Error::Refused(_) | Error::Unreadable { .. } => ESL_UNREADABLE,
             Error::Ended => ESL_ENDED,
+            Error::Exited(_) => ESL_PROGRAM_EXITED,
             _ => ESL_INVALID_ARGUMENT,
         }
     }
@@ -90,6 +93,7 @@ impl esl_status {
             ESL_BUSY => c":BUSY",
             ESL_FULL => c":FULL",
             ESL_ENDED => c":ENDED",
+            ESL_PROGRAM_EXITED => c":EXITED",
             ESL_PANIC => c":PANIC",
         }
     }

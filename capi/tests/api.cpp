@@ -100,6 +100,37 @@ static void watching() {
     CHECK(cause_of([&] { std::move(patrol).result().wait(); }) == ":ABORTED");
 }
 
+static void definitions() {
+    esl::engine engine;
+    engine.define("drive", "(metres &key (speed 0.1))", "Drives.", [](double metres, double) { return metres; });
+    engine.eval("(progn (defun speed () 1) (define-input scan))");
+    esl::value rows = engine.definitions();
+    CHECK(rows.size() == 3 && rows[0].find("name")->text() == "DRIVE");
+    CHECK(rows[0].find("documentation")->text() == "Drives." && rows[1].find("kind")->text() == "INPUT");
+    CHECK(engine.patch("(defun speed () 2) (defun fresh () 3)") == 2);
+    CHECK(engine.eval("(list (speed) (fresh))").print() == "(2 3)");
+    CHECK(engine.undo_patch() == 2 && engine.undo_patch() == 0);
+    CHECK(engine.eval("(list (speed) (fboundp 'fresh))").print() == "(1 NIL)");
+    CHECK(cause_of([&] { engine.patch("(print 1)"); }) != "nothing");
+    std::string told;
+    {
+        esl::watch watch = engine.watch_facts(esl::value::read("(at ?robot ?place)"),
+                                              [&](bool is_there, esl::value fact, esl::value bindings) {
+                                                  told += is_there ? "+" : "-";
+                                                  told += fact.print() + bindings.find("place")->text();
+                                              });
+        engine.eval("(progn (assert '(at rover ridge)) (assert '(charge 5)) (retract '(at ? ?)) (sleep 0.01))");
+    }
+    engine.eval("(progn (assert '(at rover base)) (sleep 0.01))");
+    CHECK(told == "+(AT ROVER RIDGE)RIDGE-(AT ROVER RIDGE)RIDGE");
+    try {
+        engine.eval("(exit 3)");
+        CHECK(false);
+    } catch (const esl::failure &thrown) {
+        CHECK(thrown.status() == ESL_PROGRAM_EXITED && thrown.arguments()[0].as<int>() == 3);
+    }
+}
+
 static void functions() {
     esl::engine engine;
     engine.define("area", "(width &optional height)", "An area.",
@@ -158,6 +189,7 @@ int main() {
     values();
     functions();
     objects();
+    definitions();
     json();
     watching();
     operations();

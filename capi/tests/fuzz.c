@@ -26,6 +26,7 @@ POOL(esl_handle);
 POOL(esl_reply);
 POOL(esl_task);
 POOL(esl_recording);
+POOL(esl_watch);
 
 /* An object of a pool: now and then null, or one that was freed. */
 #define ANY(type) ((type *)any((void **)type##s.live, (void **)type##s.freed))
@@ -123,8 +124,12 @@ static void begin(void *user, esl_operation *operation) {
 static void observe(void *user, const esl_seen *seen) { *(long *)user += strlen(seen->text) > 1000; }
 static void print(void *user, const char *bytes, size_t length) { *(long *)user += bytes[length - 1] == 0; }
 
+static void watched(void *user, bool is_there, const esl_value *fact, const esl_value *bindings) {
+    *(long *)user += is_there && esl_value_count(fact) < esl_value_count(bindings) / 2;
+}
+
 static const char *const texts[] = {
-    "(+ 1 2)", "(fail :lost 1 \"two\")", "(list 1", "(sleep 0.0001)", "(loop repeat 30000)", "(assert '(at rover ridge))",
+    "(+ 1 2)", "(fail :lost 1 \"two\")", "(list 1", "(defun f (x) (list x x))", "(sleep 0.0001)", "(loop repeat 30000)", "(assert '(at rover ridge))",
     "(define-input commands :capacity 2 :when-full :drop-oldest)", "(define-property charge ())",
     "(spawn (:daemon t) (loop (sleep 0.001)))", "(f 1)", "(ignore-errors (f 1 2))", "(princ 'x)", "(random 10)",
     "(defun g (&rest all) all)", "(start (work 1))", "(exit 3)", "(error \"no\")", "(make-event)", "#(1 2.5 a)",
@@ -156,7 +161,7 @@ static void one_call(void) {
     esl_progress progress;
     const esl_value *arguments[] = {live_value(), live_value()};
     size_t count = below(3);
-    switch (below(39)) {
+    switch (below(41)) {
     case 0: {
         esl_engine *engine = NULL;
         if (below(8)) break;
@@ -251,6 +256,18 @@ static void one_call(void) {
         esl_text_free(text), esl_text_free(name);
         break;
     }
+    case 38:
+        if (below(2)) status = esl_patch(ANY(esl_engine), "patch", TEXT, NULL, &failure);
+        else if (below(2)) status = esl_undo_patch(ANY(esl_engine), NULL, &failure);
+        else status = esl_definitions(ANY(esl_engine), below(2) ? "esl-user" : NAME, &value, &failure);
+        break;
+    case 39: {
+        esl_watch *watch = NULL;
+        status = esl_watch_facts(ANY(esl_engine), live_value(), below(5) ? watched : NULL, &dropped, drop, &watch,
+                                 &failure);
+        KEEP(esl_watch, watch);
+        break;
+    }
     default: {
         int descriptor = -1;
         if (below(4)) status = esl_wakeup_fd(ANY(esl_engine), &descriptor, &failure);
@@ -276,6 +293,7 @@ int main(int count, char **arguments) {
     for (calls = 0; calls < wanted && faults < 20; calls++) one_call();
     /* In no order: a handle outlives its engine. */
     FREE_ALL(esl_recording);
+    FREE_ALL(esl_watch);
     FREE_ALL(esl_engine);
     FREE_ALL(esl_value);
     FREE_ALL(esl_handle);

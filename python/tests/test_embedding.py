@@ -21,4 +21,4 @@ def test_task(task, capfd):
 
 
 def test_there_are_tasks():
-    assert len(TASKS) == 8
+    assert len(TASKS) == 10
