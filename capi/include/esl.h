@@ -86,6 +86,10 @@ typedef enum {
    */
   ESL_ENDED = 14,
   /**
+   * The program has asked to end; the argument of the failure is the status.
+   */
+  ESL_PROGRAM_EXITED = 16,
+  /**
    * A fault of ESL itself. The message has what to report.
    */
   ESL_PANIC = 15,
@@ -275,6 +279,11 @@ typedef enum {
    * An object of the embedder's.
    */
   ESL_HOST_OBJECT = 16,
+  /**
+   * A hash table that compares its keys by `eq`, `eql` or `equal`; its items are its keys, each followed by
+   * its value.
+   */
+  ESL_TABLE = 17,
 } esl_kind;
 
 /**
@@ -326,6 +335,11 @@ typedef struct esl_reply esl_reply;
  * A task that was started by a handle.
  */
 typedef struct esl_task esl_task;
+
+/**
+ * A watch over facts. It belongs to the caller, and lasts until it is freed. From any thread, one at a time.
+ */
+typedef struct esl_watch esl_watch;
 
 /**
  * A function that takes the output of programs. It is called on the threads of engines, with `length` bytes
@@ -447,6 +461,14 @@ typedef void (*esl_operation_function)(void *user, esl_operation *operation);
  * hands on the message. It neither ends the operation nor uses the engine.
  */
 typedef void (*esl_notice_function)(void *user);
+
+/**
+ * A function that is told of a change of a fact: whether the fact is in the database now, the fact, and the
+ * values of the pattern's variables in it, a property list such as (:ROBOT ROVER :PLACE RIDGE). Both live
+ * until it returns. It is called on the thread of the engine, while no task runs: it returns soon, and uses
+ * handles only. It must not leave by an exception of C++ or by `longjmp`.
+ */
+typedef void (*esl_fact_function)(void *user, bool is_there, const esl_value *fact, const esl_value *bindings);
 
 #ifdef __cplusplus
 extern "C" {
@@ -1059,6 +1081,69 @@ esl_status esl_operation_on_cancel(const esl_operation *operation,
                                    esl_destructor destructor);
 
 /**
+ * Makes the definitions of a text in the program, all at once, or none of them if any fails: calls that are
+ * under way keep the code that they have. `name` stands for the text in messages. Stores the number of
+ * definitions.
+ *
+ * The caller sees to it that
+ * `engine` is an engine; `name` and `text` end with null characters; `count` and `failure` are places that
+ * can be written, or null.
+ */
+esl_status esl_patch(const esl_engine *engine,
+                     const char *name,
+                     const char *text,
+                     size_t *count,
+                     esl_failure **failure);
+
+/**
+ * Takes the newest patch back: its names mean what they meant before. Stores the number of its definitions;
+ * 0 if there is no patch.
+ *
+ * The caller sees to it that
+ * `engine` is an engine; `count` and `failure` are places that can be written, or null.
+ */
+esl_status esl_undo_patch(const esl_engine *engine, size_t *count, esl_failure **failure);
+
+/**
+ * Stores the definitions of the program in a package, "esl-user" unless it says otherwise, sorted by name: a
+ * list of property lists such as (:KIND :FUNCTION :NAME "DRIVE" :PARAMETERS "metres &key (speed 0.1)"
+ * :DOCUMENTATION "Drives."). The kinds are function, operation, macro, property, input, variable, constant.
+ *
+ * The caller sees to it that
+ * `engine` is an engine; `package` ends with a null character; `definitions` and `failure` are places that
+ * can be written, or null.
+ */
+esl_status esl_definitions(const esl_engine *engine,
+                           const char *package,
+                           esl_value **definitions,
+                           esl_failure **failure);
+
+/**
+ * Has a function called for each change of a fact that matches a pattern, such as "(at ?robot ?place)", in
+ * the order of the changes, from the next turn on until the watch is freed. With a status other than
+ * `ESL_OK`, `user` is freed at once, otherwise with the engine.
+ *
+ * The caller sees to it that
+ * `engine` is an engine and `pattern` a value; `function` and `destructor` can be called with `user`; `watch`
+ * and `failure` are places that can be written, or null.
+ */
+esl_status esl_watch_facts(const esl_engine *engine,
+                           const esl_value *pattern,
+                           esl_fact_function function,
+                           void *user,
+                           esl_destructor destructor,
+                           esl_watch **watch,
+                           esl_failure **failure);
+
+/**
+ * Ends a watch, and frees it; null is ignored.
+ *
+ * The caller sees to it that
+ * `watch` was not freed before.
+ */
+void esl_watch_free(esl_watch *watch);
+
+/**
  * Has engines keep a recording in memory, which `esl_engine_recording` returns.
  *
  * The caller sees to it that
@@ -1234,6 +1319,17 @@ esl_value *esl_list(const esl_value *const *items, size_t count);
 esl_value *esl_vector(const esl_value *const *items, size_t count);
 
 /**
+ * Creates a hash table of `count` keys and as many values, which are copied: `items` has each key, followed by
+ * its value. The program compares the keys by `equal`; of equal keys, the last one counts. Returns null if one is
+ * null.
+ *
+ * The caller sees to it that
+ * `items` points to twice `count` values.
+ */
+esl_value *esl_table(const esl_value *const *items,
+                     size_t count);
+
+/**
  * Reads a value as programs write it: "(at ?robot (3.5 :north))".
  *
  * The caller sees to it that
@@ -1330,7 +1426,7 @@ const double *esl_value_floats(const esl_value *value, size_t *length);
 const uint8_t *esl_value_text_bytes(const esl_value *value, size_t *length);
 
 /**
- * Returns the number of items of a list or vector; 0 for other values.
+ * Returns the number of items of a list, vector or table, two for each key; 0 for other values.
  *
  * The caller sees to it that
  * `value` is a value, or null.
@@ -1338,13 +1434,14 @@ const uint8_t *esl_value_text_bytes(const esl_value *value, size_t *length);
 size_t esl_value_count(const esl_value *value);
 
 /**
- * Returns an item of a list or vector, from 0. It is a part of the value. Returns null beyond the last, and
+ * Returns an item of a list, vector or table, from 0. It is a part of the value. Returns null beyond the last, and
  * for vectors of numbers, whose elements other functions show.
  *
  * The caller sees to it that
  * `value` is a value, or null.
  */
-const esl_value *esl_value_item(const esl_value *value, size_t index);
+const esl_value *esl_value_item(const esl_value *value,
+                                size_t index);
 
 /**
  * Copies the text of a string or a character, or the name of a keyword or symbol, for `esl_text_free`. Null

@@ -63,6 +63,11 @@ public:
     static value nil() { return value(); }
     static value list(const std::vector<value> &items) { return of_items(items, esl_list); }
     static value vector(const std::vector<value> &items) { return of_items(items, esl_vector); }
+    static value table(const std::vector<std::pair<value, value>> &entries) {
+        std::vector<const esl_value *> pointers;
+        for (const auto &entry : entries) pointers.insert(pointers.end(), {entry.first.get(), entry.second.get()});
+        return value(esl_table(pointers.data(), entries.size()));
+    }
     // Reads a value as programs write it.
     static value read(const std::string &text);
     // Reads a value from a text in JSON: objects are association lists, arrays vectors.
@@ -74,9 +79,17 @@ public:
     esl_value *release() { return object.release(); }
     esl_kind kind() const { return esl_value_kind(get()); }
     bool is_true() const { return esl_value_is_true(get()); }
-    // The items of a list or vector.
+    // The items of a list or vector; of a table its keys, each followed by its value.
     std::size_t size() const { return esl_value_count(get()); }
     value operator[](std::size_t index) const { return copy(esl_value_item(get(), index)); }
+    // The keys and values of a table; none for other values.
+    std::vector<std::pair<value, value>> entries() const {
+        std::vector<std::pair<value, value>> result;
+        for (std::size_t i = 0; kind() == ESL_TABLE && i + 1 < size(); i += 2) {
+            result.emplace_back((*this)[i], (*this)[i + 1]);
+        }
+        return result;
+    }
     // The value of a key in a property list; nothing if it has none.
     std::optional<value> find(const std::string &key) const;
     // The value as the program prints it.

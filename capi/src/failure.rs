@@ -3,9 +3,9 @@
 use std::ffi::{CString, c_char};
 use std::ptr;
 
-use esl::{Data, Error};
 use esl::engine::Failure;
 use esl::host::{FailureFrame, SendError};
+use esl::{Data, Error};
 
 use crate::border::{freeing, look, making, store, take, text};
 use crate::status::esl_status::{self, ESL_FAILED};

@@ -142,6 +142,17 @@ fn pair(key: Data, value: Data) -> Data {
     }
 }
 
+/// Returns the key of an object that a key of a pair or table becomes.
+fn object_key(key: &Data) -> Option<String> {
+    Some(match key {
+        Data::String(key) => key.clone(),
+        Data::Symbol(key) | Data::Keyword(key) => key.to_lowercase(),
+        Data::True => "t".into(),
+        Data::Integer(_) | Data::BigInteger(_) => key.to_string(),
+        _ => return None,
+    })
+}
+
 /// Returns the key and the value of a pair, if its key is one of an object.
 fn member(item: &Data) -> Option<(String, Data)> {
     let (key, value) = match item {
@@ -150,14 +161,7 @@ fn member(item: &Data) -> Option<(String, Data)> {
         Data::DottedList(items, tail) => (&items[0], Data::DottedList(items[1..].into(), tail.clone())),
         _ => return None,
     };
-    let key = match key {
-        Data::String(key) => key.clone(),
-        Data::Symbol(key) | Data::Keyword(key) => key.to_lowercase(),
-        Data::True => "t".into(),
-        Data::Integer(_) | Data::BigInteger(_) => key.to_string(),
-        _ => return None,
-    };
-    Some((key, value))
+    Some((object_key(key)?, value))
 }
 
 fn write_text(text: &str, out: &mut String) -> Result<(), Fault> {
@@ -206,6 +210,20 @@ fn write_array<T>(
     Ok(())
 }
 
+fn write_object<'a>(
+    members: impl IntoIterator<Item = (&'a String, &'a Data)>,
+    out: &mut String,
+) -> Result<(), Fault> {
+    out.push('{');
+    write_items(members, out, |(key, value), out| {
+        write_text(key, out)?;
+        out.push(':');
+        write(value, out)
+    })?;
+    out.push('}');
+    Ok(())
+}
+
 /// Writes a value. Its depth is limited where it has become data.
 fn write(data: &Data, out: &mut String) -> Result<(), Fault> {
     match data {
@@ -224,15 +242,7 @@ fn write(data: &Data, out: &mut String) -> Result<(), Fault> {
         Data::Keyword(name) if name == "FALSE" => out.push_str("false"),
         Data::Keyword(name) | Data::Symbol(name) => write_text(&name.to_lowercase(), out)?,
         Data::List(items) => match items.iter().map(member).collect::<Option<Vec<_>>>() {
-            Some(members) => {
-                out.push('{');
-                write_items(members, out, |(key, value), out| {
-                    write_text(&key, out)?;
-                    out.push(':');
-                    write(&value, out)
-                })?;
-                out.push('}');
-            }
+            Some(members) => write_object(members.iter().map(|(key, value)| (key, value)), out)?,
             None => write_array(items, out, write)?,
         },
         Data::Vector(items) => write_array(items, out, write)?,
@@ -240,6 +250,15 @@ fn write(data: &Data, out: &mut String) -> Result<(), Fault> {
         Data::Packed(PackedVector::Integers(integers)) => write_array(integers.iter(), out, write_number)?,
         Data::Packed(PackedVector::Floats(floats)) => {
             write_array(floats.iter().copied(), out, write_float)?;
+        }
+        Data::Table(entries) => {
+            let member = |(key, value)| {
+                let no_key = || Fault::new(ESL_NOT_OF_TYPE, format!("JSON has no form for the key {key}"));
+                Ok((object_key(key).ok_or_else(no_key)?, value))
+            };
+            let members: Vec<(String, &Data)> =
+                entries.iter().map(|(key, value)| member((key, value))).collect::<Result<_, Fault>>()?;
+            write_object(members.iter().map(|(key, value)| (key, *value)), out)?;
         }
         Data::DottedList(..) | Data::Opaque(_) => {
             return Err(Fault::new(ESL_NOT_OF_TYPE, format!("JSON has no form for {data}")));

@@ -135,7 +135,7 @@ impl WatcherOfC {
 }
 
 /// Has a function called for each change of a fact that matches a pattern, such as "(at ?robot ?place)", in
-/// the order of the changes, from the next turn on until the watch is freed. With a status other than
+/// the order of the changes, until the watch is freed. With a status other than
 /// `ESL_OK`, `user` is freed at once, otherwise with the engine.
 ///
 /// # Safety

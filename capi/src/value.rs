@@ -58,6 +58,9 @@ pub enum esl_kind {
     ESL_FLOATS = 15,
     /// An object of the embedder's.
     ESL_HOST_OBJECT = 16,
+    /// A hash table that compares its keys by `eq`, `eql` or `equal`; its items are its keys, each followed by
+    /// its value.
+    ESL_TABLE = 17,
 }
 
 use esl_kind::*;
@@ -214,6 +217,26 @@ pub unsafe extern "C" fn esl_vector(items: *const *const esl_value, count: usize
     making(|| Ok(esl_value(Data::Vector(unsafe { values(items, count) }?))))
 }
 
+/// Creates a hash table of `count` keys and as many values, which are copied: `items` has each key, followed by
+/// its value. The program compares the keys by `equal`; of equal keys, the last one counts. Returns null if one is
+/// null.
+///
+/// # Safety
+/// `items` points to twice `count` values.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_table(items: *const *const esl_value, count: usize) -> *mut esl_value {
+    making(|| {
+        let both = count.checked_mul(2).ok_or_else(|| Fault::new(ESL_NOT_OF_TYPE, "too many keys"))?;
+        // SAFETY: each pointer is null, or to what C holds and lends.
+        let mut items = unsafe { values(items, both) }?.into_iter();
+        let mut entries = Vec::with_capacity(count);
+        while let (Some(key), Some(value)) = (items.next(), items.next()) {
+            entries.push((key, value));
+        }
+        Ok(esl_value(Data::Table(entries)))
+    })
+}
+
 /// Reads a value as programs write it: "(at ?robot (3.5 :north))".
 ///
 /// # Safety
@@ -281,6 +304,7 @@ pub unsafe extern "C" fn esl_value_kind(value: *const esl_value) -> esl_kind {
         Data::Packed(PackedVector::Integers(_)) => ESL_INTEGERS,
         Data::Packed(PackedVector::Floats(_)) => ESL_FLOATS,
         Data::Opaque(_) => ESL_HOST_OBJECT,
+        Data::Table(_) => ESL_TABLE,
     }
 }
 
@@ -399,7 +423,7 @@ pub unsafe extern "C" fn esl_value_text_bytes(value: *const esl_value, length: *
     }
 }
 
-/// Returns the number of items of a list or vector; 0 for other values.
+/// Returns the number of items of a list, vector or table, two for each key; 0 for other values.
 ///
 /// # Safety
 /// `value` is a value, or null.
@@ -410,11 +434,12 @@ pub unsafe extern "C" fn esl_value_count(value: *const esl_value) -> usize {
         Some(Data::List(items) | Data::Vector(items)) => items.len(),
         Some(Data::DottedList(items, _)) => items.len() + 1,
         Some(Data::Packed(vector)) => vector.len(),
+        Some(Data::Table(entries)) => 2 * entries.len(),
         _ => 0,
     }
 }
 
-/// Returns an item of a list or vector, from 0. It is a part of the value. Returns null beyond the last, and
+/// Returns an item of a list, vector or table, from 0. It is a part of the value. Returns null beyond the last, and
 /// for vectors of numbers, whose elements other functions show.
 ///
 /// # Safety
@@ -426,6 +451,9 @@ pub unsafe extern "C" fn esl_value_item(value: *const esl_value, index: usize) -
         Some(Data::List(items) | Data::Vector(items)) => items.get(index),
         Some(Data::DottedList(items, tail)) if index == items.len() => Some(&**tail),
         Some(Data::DottedList(items, _)) => items.get(index),
+        Some(Data::Table(entries)) => {
+            entries.get(index / 2).map(|(key, value)| if index.is_multiple_of(2) { key } else { value })
+        }
         _ => None,
     };
     // A value is nothing but its data, as `repr(transparent)` says.

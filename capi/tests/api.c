@@ -93,6 +93,17 @@ static void values(void) {
     esl_value_free(value);
     CHECK(esl_value_count(copy) == 4);
     esl_value_free(copy);
+
+    esl_value *both[] = {esl_string("a"), esl_integer(1), esl_integer(7), esl_nil()};
+    value = esl_table((const esl_value *const *)both, 2);
+    for (int i = 0; i < 4; i++) esl_value_free(both[i]);
+    CHECK(esl_value_kind(value) == ESL_TABLE && esl_value_count(value) == 4);
+    CHECK(esl_value_integer(esl_value_item(value, 2), &integer) && integer == 7);
+    CHECK(esl_value_item(value, 4) == NULL);
+    CHECK(esl_value_json(value, &text, NULL) == ESL_OK && strcmp(text, "{\"a\":1,\"7\":false}") == 0);
+    esl_text_free(text);
+    esl_value_free(value);
+    CHECK(esl_table(NULL, SIZE_MAX) == NULL);
 }
 
 /* (add a b), which fails for negative numbers. */

@@ -65,6 +65,17 @@ static void objects() {
     CHECK(alive.expired());
 }
 
+static void tables() {
+    esl::engine engine;
+    esl::value table = esl::value::table({{"ridge", 0.5}, {2, esl::value::list({1})}});
+    CHECK(engine.call("hash-table-count", {table}).as<int>() == 2);
+    CHECK(engine.call("gethash", {"ridge", table}).as<double>() == 0.5);
+    esl::value made = engine.eval("(let ((table (make-hash-table))) (setf (gethash :on table) 3) table)");
+    CHECK(made.entries().size() == 1 && made.entries()[0].first.text() == "ON");
+    CHECK(made.entries()[0].second.as<int>() == 3 && made[1].as<int>() == 3);
+    CHECK(made.json() == "{\"on\":3}" && esl::value(1).entries().empty());
+}
+
 static void json() {
     esl::value read = esl::value::of_json("{\"a\": [1, 2.5, null], \"b\": {\"c\": true}}");
     CHECK(read.print() == "((\"a\" . #(1 2.5 :NULL)) (\"b\" (\"c\" . T)))");
@@ -103,14 +114,14 @@ static void watching() {
 static void definitions() {
     esl::engine engine;
     engine.define("drive", "(metres &key (speed 0.1))", "Drives.", [](double metres, double) { return metres; });
-    engine.eval("(progn (defun speed () 1) (define-input scan))");
+    engine.eval("(progn (defun pace () 1) (define-input scan))");
     esl::value rows = engine.definitions();
     CHECK(rows.size() == 3 && rows[0].find("name")->text() == "DRIVE");
-    CHECK(rows[0].find("documentation")->text() == "Drives." && rows[1].find("kind")->text() == "INPUT");
-    CHECK(engine.patch("(defun speed () 2) (defun fresh () 3)") == 2);
-    CHECK(engine.eval("(list (speed) (fresh))").print() == "(2 3)");
+    CHECK(rows[0].find("documentation")->text() == "Drives." && rows[2].find("kind")->text() == "INPUT");
+    CHECK(engine.patch("(defun pace () 2) (defun fresh () 3)") == 2);
+    CHECK(engine.eval("(list (pace) (fresh))").print() == "(2 3)");
     CHECK(engine.undo_patch() == 2 && engine.undo_patch() == 0);
-    CHECK(engine.eval("(list (speed) (fboundp 'fresh))").print() == "(1 NIL)");
+    CHECK(engine.eval("(list (pace) (fboundp 'fresh))").print() == "(1 NIL)");
     CHECK(cause_of([&] { engine.patch("(print 1)"); }) != "nothing");
     std::string told;
     {
@@ -189,6 +200,7 @@ int main() {
     values();
     functions();
     objects();
+    tables();
     definitions();
     json();
     watching();

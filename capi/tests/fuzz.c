@@ -239,12 +239,13 @@ static void one_call(void) {
     }
     case 35: status = esl_value_read(TEXT, &value, &failure); break;
     case 36:
-        switch (below(6)) {
+        switch (below(7)) {
         case 0: value = esl_integer((int64_t)below(100)); break;
         case 1: value = esl_string(TEXT); break;
         case 2: value = esl_list(arguments, count); break;
         case 3: value = esl_object("THING", "", &dropped, drop); break;
         case 4: value = esl_float(0.5); break;
+        case 5: value = esl_table(arguments, count / 2); break;
         default: value = esl_vector(arguments, count);
         }
         break;

@@ -199,15 +199,15 @@ impl Console {
     }
 
     /// Waits for the end of a line of at most `limit` characters, or of the input. Returns whether it has
-    /// arrived; otherwise that many characters have.
+    /// arrived; otherwise more characters have.
     pub fn await_line(&mut self, host: &mut dyn Host, limit: usize) -> Taken<bool> {
         let mut searched = 0;
         loop {
-            if self.input.iter().take(limit).skip(searched).any(|&c| c == u32::from('\n')) {
+            if self.input.iter().take(limit + 1).skip(searched).any(|&c| c == u32::from('\n')) {
                 return Taken::Next(true);
             }
             searched = self.input.len();
-            if searched >= limit {
+            if searched > limit {
                 return Taken::Next(false);
             }
             match self.fill(host) {
@@ -223,7 +223,7 @@ impl Console {
     /// Takes the characters that have arrived up to the end of a line, at most `limit`, and returns whether the
     /// line has ended with them.
     pub fn take_line(&mut self, limit: usize) -> (Vec<u32>, bool) {
-        let end = self.input.iter().take(limit).position(|&c| c == u32::from('\n'));
+        let end = self.input.iter().take(limit + 1).position(|&c| c == u32::from('\n'));
         let line = self.input.drain(..end.unwrap_or_else(|| limit.min(self.input.len()))).collect();
         if end.is_some() {
             self.input.pop_front();

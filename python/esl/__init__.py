@@ -41,7 +41,7 @@ from .errors import (
 )
 from .facts import FactChange, Facts, Input, Inputs, Subscription
 from .program import Replay, RunResult, check, check_file, replay, run
-from .values import Character, Dotted, Keyword, Object, Symbol
+from .values import Character, Dotted, Keyword, Object, Symbol, Table
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_esl.note_fork)
@@ -79,6 +79,7 @@ __all__ = [
     "Stopped",
     "Subscription",
     "Symbol",
+    "Table",
     "TaskInfo",
     "Tasks",
     "Timeline",

@@ -2,16 +2,16 @@
 
 Other values are those of Python: NIL is None, T is True, integers of any size are int, ratios Fraction, floats float,
 strings str. Lists are lists, vectors are tuples; vectors of bytes are bytes, and those of floats alone arrays of the
-module `array`. In the other direction False is NIL too, a dictionary becomes a property list, and an object with a
+module `array`. A hash table is a Table, a dictionary. In the other direction False is NIL too, a dictionary becomes a property list, and an object with a
 buffer of one dimension, such as an array of numpy, a vector of numbers.
 
-An object of the program that has no counterpart here, such as a task or a table, comes as a ProgramObject, which shows
+An object of the program that has no counterpart here, such as a task or a structure, comes as a ProgramObject, which shows
 what it is; a program does not take it back.
 """
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Any, Dict, TypeVar
 
 
 _N = TypeVar("_N", bound="_Named")
@@ -103,6 +103,15 @@ class Dotted:
 
     def __repr__(self) -> str:
         return f"Dotted({self.items!r}, {self.tail!r})"
+
+
+class Table(Dict[Any, Any]):
+    """A hash table of a program, which compares its keys by `equal`. Other dictionaries become property lists."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f"Table({super().__repr__()})"
 
 
 class Object:

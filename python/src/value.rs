@@ -35,7 +35,7 @@ pub(crate) fn held(py: Python<'_>, data: &Data) -> Option<Py<PyAny>> {
 }
 
 /// Something that a program holds and Python does not look into: an object of a module of the library, which
-/// the program gets back as itself, or an object of the program, such as a task or a table, which does not
+/// the program gets back as itself, or an object of the program, such as a task or a structure, which does not
 /// return.
 #[pyclass(frozen, module = "esl", name = "ProgramObject")]
 pub(crate) struct ProgramObject(Data);
@@ -72,6 +72,7 @@ struct Classes {
     character: Py<PyAny>,
     dotted: Py<PyAny>,
     object: Py<PyAny>,
+    table: Py<PyAny>,
     fraction: Py<PyAny>,
     array: Py<PyAny>,
 }
@@ -89,10 +90,17 @@ fn classes(py: Python<'_>) -> PyResult<&Classes> {
             character: class("Character")?,
             dotted: class("Dotted")?,
             object: class("Object")?,
+            table: class("Table")?,
             fraction: py.import("fractions")?.getattr("Fraction")?.unbind(),
             array: py.import("array")?.getattr("array")?.unbind(),
         })
     })
+}
+
+fn no_key(key: &Bound<'_, PyAny>) -> PyErr {
+    PyValueError::new_err(format!(
+        "{key} is a key of a table, which Python cannot hash: have the program return a list of keys and values"
+    ))
 }
 
 fn too_deep() -> PyErr {
@@ -132,6 +140,17 @@ fn convert<'py>(py: Python<'py>, data: &Data, depth: u32) -> PyResult<Bound<'py,
             classes(py)?.dotted.bind(py).call1((items, convert(py, tail, depth)?))?
         }
         Data::Vector(items) => PyTuple::new(py, all(items)?)?.into_any(),
+        Data::Table(entries) => {
+            let table = classes(py)?.table.bind(py).call0()?;
+            for (key, value) in entries {
+                let (key, value) = (convert(py, key, depth)?, convert(py, value, depth)?);
+                if table.contains(&key).map_err(|_| no_key(&key))? {
+                    return Err(PyValueError::new_err(format!("two keys of a table are {key} in Python")));
+                }
+                table.set_item(key, value)?;
+            }
+            table
+        }
         Data::Packed(PackedVector::Bytes(bytes)) => PyBytes::new(py, bytes).into_any(),
         Data::Packed(PackedVector::Integers(integers)) => {
             array("q", integers.iter().flat_map(|n| n.to_ne_bytes()).collect())?
@@ -182,6 +201,10 @@ fn read(object: &Bound<'_, PyAny>, depth: u32) -> PyResult<Data> {
         return Ok(Data::Vector(all(value.iter().collect())?));
     }
     if let Ok(value) = object.cast::<PyDict>() {
+        if !object.is_exact_instance_of::<PyDict>() && object.is_instance(classes(py)?.table.bind(py))? {
+            let entries = value.iter().map(|(key, value)| Ok((read(&key, depth)?, read(&value, depth)?)));
+            return entries.collect::<PyResult<_>>().map(Data::Table);
+        }
         return properties(value, depth);
     }
     if let Ok(value) = object.cast::<PyBytes>() {

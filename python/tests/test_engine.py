@@ -11,7 +11,7 @@ from fractions import Fraction
 import pytest
 
 import esl
-from esl import Character, Dotted, Keyword, Object, Symbol
+from esl import Character, Dotted, Keyword, Object, Symbol, Table
 
 
 @pytest.fixture

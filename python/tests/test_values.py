@@ -44,9 +44,27 @@ def test_queries_know_the_words_of_the_language(engine):
     assert [row["who"] for row in engine.facts.query(both)] == [Symbol("ann"), Symbol("bob")]
 
 
+def test_tables_are_dictionaries(engine):
+    table = engine.eval(
+        "(let ((table (make-hash-table :test 'equal))) (setf (gethash \"a\" table) 1 (gethash :on table) nil) table)"
+    )
+    assert table == {"a": 1, esl.Keyword("on"): None} and isinstance(table, esl.Table)
+    table["b"] = esl.Table({(1, 2): [esl.Table()]})
+    assert there_and_back(engine, table) == table
+    engine.eval("(defun look (key table) (multiple-value-list (gethash key table)))")
+    assert engine.call("look", "a", table) == [1, True]
+    assert engine.call("look", "c", table) == [None, None]
+    assert engine.call("hash-table-count", esl.Table({1: 2, 3: 4})) == 2
+    for key, text in [("(list 1)", "cannot hash"), ("(copy-seq \"a\")", "two keys")]:
+        with pytest.raises(ValueError, match=text):
+            engine.eval(f"(let ((table (make-hash-table))) (dotimes (i 2) (setf (gethash {key} table) i)) table)")
+    with pytest.raises(esl.Error):
+        engine.eval("(let ((table (make-hash-table))) (setf (gethash 1 table) table) table)")
+
+
 def test_objects_of_a_program_do_not_return(engine):
     for text, kind in [
-        ("(make-hash-table)", "HASHTABLE"),
+        ("(make-hash-table :test 'equalp)", "HASHTABLE"),
         ("(spawn (sleep 0))", "TASK"),
         ("#'car", "CAR"),
     ]:

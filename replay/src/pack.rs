@@ -72,7 +72,7 @@ impl ByteWriter {
                 open.push((datum, true));
                 match datum.kind() {
                     DatumKind::Cons(car, cdr) => open.extend([(car, false), (cdr, false)]),
-                    DatumKind::Vector(items) | DatumKind::Array(_, items) => {
+                    DatumKind::Vector(items) | DatumKind::Array(_, items) | DatumKind::Table(items) => {
                         open.extend(items.iter().map(|item| (item, false)));
                     }
                     _ => {}
@@ -105,6 +105,7 @@ mod tag {
     pub(super) const BYTES: u8 = 12;
     pub(super) const INTEGERS: u8 = 13;
     pub(super) const FLOATS: u8 = 14;
+    pub(super) const TABLE: u8 = 15;
 }
 
 /// Writes a node whose parts have these numbers.
@@ -156,6 +157,10 @@ fn node(out: &mut ByteWriter, kind: &DatumKind, number: &dyn Fn(&Datum) -> u64) 
         DatumKind::Array(dimensions, items) => {
             out.byte(tag::ARRAY);
             out.list(dimensions, |out, &dimension| out.number(u64::from(dimension)));
+            out.list(items, |out, item| out.number(number(item)));
+        }
+        DatumKind::Table(items) => {
+            out.byte(tag::TABLE);
             out.list(items, |out, item| out.number(number(item)));
         }
         DatumKind::Packed(vector) => {
@@ -290,6 +295,10 @@ impl<'a> ByteReader<'a> {
                 let size = dimensions.iter().try_fold(1_usize, |size, &n| size.checked_mul(n as usize));
                 let fits = size == Some(items.len()) && dimensions.len() != 1 && dimensions.len() < 8;
                 fits.then_some(DatumKind::Array(dimensions.into(), items.into()))?
+            }
+            tag::TABLE => {
+                let items = self.list(|from| part(from.number()?))?;
+                items.len().is_multiple_of(2).then_some(DatumKind::Table(items.into()))?
             }
             tag::BYTES => DatumKind::Packed(PackedVector::Bytes(self.bytes()?.to_vec().into())),
             tag::INTEGERS => {

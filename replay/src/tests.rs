@@ -110,11 +110,15 @@ fn data() -> Vec<Datum> {
     ];
     let packed = packed.map(|vector| datum(DatumKind::Packed(vector)));
     let vector = datum(DatumKind::Vector(vec![text.clone(), text.clone()].into()));
+    let table = datum(DatumKind::Table(vec![text.clone(), numbers[0].clone()].into()));
     let array = datum(DatumKind::Array(vec![1, 2].into(), numbers[..2].to_vec().into()));
     let symbols = [Symbol::new(&USER_PACKAGE.into(), "X"), Symbol::uninterned(3, "G"), Symbol::keyword("K")];
     let symbols = symbols.map(|symbol| Datum::symbol(symbol, Span::default()));
-    let all =
-        numbers.into_iter().chain(symbols).chain([vector, array, Datum::nil(Span::default())]).chain(packed);
+    let all = numbers
+        .into_iter()
+        .chain(symbols)
+        .chain([vector, array, table, Datum::nil(Span::default())])
+        .chain(packed);
     vec![Datum::list_with_tail(all.collect::<Vec<_>>(), text, Span::default())]
 }
 

@@ -1,5 +1,7 @@
 //! Conversion between data and types of Rust.
 
+use std::collections::{BTreeMap, HashMap};
+use std::hash::Hash;
 use std::sync::Arc;
 
 use esl_bytecode::Bytes;
@@ -194,6 +196,34 @@ impl<T: FromData> FromData for Vec<T> {
     }
 }
 
+/// A hash table; of equal keys, the last one counts.
+macro_rules! convert_maps {
+    ($( $map:ident<$key:ident: $($bound:path),+> )*) => {
+        $(
+            impl<$key: FromData $(+ $bound)+, V: FromData> FromData for $map<$key, V> {
+                const TYPE: &'static str = "HASH-TABLE";
+
+                fn from_data(data: &Data) -> Option<Self> {
+                    let entries = data.as_table()?.iter();
+                    entries.map(|(key, value)| Some((K::from_data(key)?, V::from_data(value)?))).collect()
+                }
+            }
+
+            impl<$key: Into<Data>, V: Into<Data>> From<$map<$key, V>> for Data {
+                /// Returns a hash table.
+                fn from(map: $map<$key, V>) -> Data {
+                    Data::Table(map.into_iter().map(|(key, value)| (key.into(), value.into())).collect())
+                }
+            }
+        )*
+    };
+}
+
+convert_maps! {
+    HashMap<K: Eq, Hash>
+    BTreeMap<K: Ord>
+}
+
 impl From<&str> for Data {
     fn from(value: &str) -> Data {
         Data::String(value.to_owned())
@@ -236,5 +266,16 @@ mod tests {
         let list = Data::list([Data::Integer(7), Data::Integer(256)]);
         assert_eq!((Bytes::from_data(&list), Vec::<f64>::from_data(&list)), (None, Some(vec![7.0, 256.0])));
         assert_eq!(Data::from(vec![0.5, 1.5]), Data::list([Data::Float(0.5), Data::Float(1.5)]));
+    }
+
+    #[test]
+    fn maps_are_hash_tables() {
+        let map = BTreeMap::from([("a".to_owned(), 1_i64), ("b".to_owned(), 2)]);
+        let table = Data::from(map.clone());
+        assert_eq!(table.to_string(), "#<hash-table \"a\" 1 \"b\" 2>");
+        assert_eq!(BTreeMap::<String, i64>::from_data(&table), Some(map));
+        assert_eq!(HashMap::<String, i64>::from_data(&table).map(|map| map["b"]), Some(2));
+        assert_eq!(HashMap::<i64, i64>::from_data(&table), None);
+        assert_eq!(HashMap::<i64, i64>::from_data(&Data::Nil), None, "an empty list is not a table");
     }
 }

@@ -77,13 +77,15 @@ pub enum Data {
     DottedList(Vec<Data>, Box<Data>),
     /// A vector.
     Vector(Vec<Data>),
+    /// A hash table that compares its keys by `eq`, `eql` or `equal`: its keys and values, in the order in
+    /// which they came. A table made of it compares them by `equal`, and of equal keys the last one counts.
+    Table(Vec<(Data, Data)>),
     /// A vector of numbers: of bytes, if that is its element type, or of floats, if all elements are.
     /// `Vec<f64>`, `Vec<u8>`, [`Bytes`] and others are made of it.
     Packed(PackedVector),
     /// Something of the embedder's: an [`Opaque`] makes it, and is made of it. An object of the program that
-    /// no data stands for, such as a task or a hash table, is opaque as well
-    /// ([`is_of_program`](OpaqueDatum::is_of_program)); what the program gets back is the text that describes
-    /// it.
+    /// no data stands for, such as a task, is opaque as well ([`is_of_program`](OpaqueDatum::is_of_program));
+    /// what the program gets back is the text that describes it.
     Opaque(OpaqueDatum),
 }
 
@@ -160,6 +162,25 @@ impl Data {
         }
     }
 
+    /// Returns the keys and values, if the value is a hash table.
+    ///
+    /// ```
+    /// use esl::{Data, Engine};
+    ///
+    /// let mut engine = Engine::new()?;
+    /// let table = Data::Table(vec![("ridge".into(), 0.5.into())]);
+    /// let speed: f64 = engine.call("gethash", ["ridge".into(), table])?;
+    /// let made = engine.eval("(let ((table (make-hash-table))) (setf (gethash :on table) 3) table)")?;
+    /// assert_eq!((speed, made.as_table()), (0.5, Some(&[(Data::Keyword("ON".into()), 3.into())][..])));
+    /// # Ok::<(), esl::Error>(())
+    /// ```
+    pub fn as_table(&self) -> Option<&[(Data, Data)]> {
+        match self {
+            Data::Table(entries) => Some(entries),
+            _ => None,
+        }
+    }
+
     /// Returns the elements, if the value is a proper list; no elements for `NIL`.
     pub fn as_list(&self) -> Option<&[Data]> {
         match self {
@@ -190,6 +211,10 @@ impl Data {
             Data::Vector(items) => {
                 DatumKind::Vector(items.iter().map(|item| item.to_datum(package)).collect())
             }
+            Data::Table(entries) => {
+                let items = entries.iter().flat_map(|(key, value)| [key, value]);
+                DatumKind::Table(items.map(|item| item.to_datum(package)).collect())
+            }
             Data::Packed(vector) => DatumKind::Packed(vector.clone()),
             Data::Opaque(object) if object.is_of_program() => DatumKind::String(object.text().into()),
             Data::Opaque(opaque) => DatumKind::Opaque(opaque.clone()),
@@ -215,8 +240,10 @@ impl Data {
 
     /// Returns a datum with this number of levels, and sets `is_cut` if it has more.
     fn within(datum: &Datum, levels: usize, is_cut: &mut bool) -> Data {
-        let is_compound =
-            matches!(datum.kind(), DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..));
+        let is_compound = matches!(
+            datum.kind(),
+            DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) | DatumKind::Table(_)
+        );
         let Some(levels) = levels.checked_sub(usize::from(is_compound)) else {
             *is_cut = true;
             return Data::String("#".into());
@@ -236,6 +263,11 @@ impl Data {
             DatumKind::String(value) => Data::String(value.to_string()),
             DatumKind::Vector(items) | DatumKind::Array(_, items) => {
                 Data::Vector(items.iter().map(|item| Data::within(item, levels, is_cut)).collect())
+            }
+            DatumKind::Table(items) => {
+                let mut within = |item| Data::within(item, levels, is_cut);
+                let entries = items.as_chunks().0.iter();
+                Data::Table(entries.map(|[key, value]| (within(key), within(value))).collect())
             }
             DatumKind::Packed(vector) => Data::Packed(vector.clone()),
             DatumKind::Opaque(opaque) => Data::Opaque(opaque.clone()),
@@ -348,6 +380,11 @@ impl fmt::Display for Data {
                 sequence(f, items)?;
                 f.write_str(")")
             }
+            Data::Table(entries) => {
+                f.write_str("#<hash-table")?;
+                entries.iter().try_for_each(|(key, value)| write!(f, " {key} {value}"))?;
+                f.write_str(">")
+            }
         }
     }
 }
@@ -372,11 +409,12 @@ mod tests {
             Data::floats([0.5]),
             Data::integers([-1]),
             Data::DottedList(vec![Data::Integer(1)], Box::new(Data::Integer(2))),
+            Data::Table(vec![(Data::String("a".into()), Data::Integer(1)), (Data::Nil, Data::True)]),
         ]);
         assert_eq!(Data::from_datum(&data.to_datum("ESL-USER")), data);
         assert_eq!(
             data.to_string(),
-            "(NIL T -5 1.5 #\\x \"a \\\"b\\\"\" :ON VALVE #(1) #(0 255) #(0.5) #(-1) (1 . 2))"
+            "(NIL T -5 1.5 #\\x \"a \\\"b\\\"\" :ON VALVE #(1) #(0 255) #(0.5) #(-1) (1 . 2) #<hash-table \"a\" 1 NIL T>)"
         );
     }
 }

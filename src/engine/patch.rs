@@ -161,7 +161,7 @@ impl Engine {
     }
 
     /// Calls a function of the library for embedders. Returns its first value.
-    fn call_embedding(&mut self, function: &str, arguments: &[Datum]) -> Result<Data, Error> {
+    pub(super) fn call_embedding(&mut self, function: &str, arguments: &[Datum]) -> Result<Data, Error> {
         self.load_embedding()?;
         let function = self.machine.library_function(function)?;
         let mut values: Vec<Value> = Vec::new();

@@ -45,9 +45,9 @@ impl Drop for FactWatch {
 
 impl Engine {
     /// Calls `function` for each change of a fact that matches a pattern, in the order of the changes, until
-    /// the watch is dropped. The watch begins when the running engine takes its messages: an [`Engine::eval`]
-    /// that does not wait can end before. `function` is called on the thread that runs the engine, between
-    /// two turns of the program's tasks, and cannot call back. A panic in it ends the watch.
+    /// the watch is dropped. `function` is called on the thread that runs the engine, between two turns of the
+    /// program's tasks, and cannot call back. A panic in it ends the watch. Tasks of the program may have some
+    /// turns until the watch has begun.
     ///
     /// ```
     /// use std::sync::mpsc::channel;
@@ -61,7 +61,6 @@ impl Engine {
     ///     let place = change.bindings.data("place").map(ToString::to_string);
     ///     drop(sender.send((change.is_there, place.unwrap_or_default())));
     /// })?;
-    /// engine.eval("(sleep 0)")?; // Changes are seen from this turn of the program on.
     /// engine.eval("(progn (assert '(at rover ridge)) (assert '(battery 90)) (retract '(at ? ?)))")?;
     /// engine.eval("(sleep 0.01)")?;
     /// drop(watch);
@@ -90,12 +89,15 @@ impl Engine {
             Ok(Data::Nil.to_datum(USER_PACKAGE))
         }));
         self.machine.add_host_function(&name, teller);
+        let teller = Data::Symbol(name.clone()).to_datum(USER_PACKAGE);
         let question = Question::Call {
             function: FunctionRef::Named("ESL::%WATCH-FACTS".into()),
             arguments: handle::data([pattern.into(), Data::Symbol(name)]),
             // Once it is taken, it begins before the other tasks go on.
             goes_first: true,
         };
-        Ok(FactWatch(TaskHandle::begin(Sender::new(&self.machine.inbox()), question)))
+        let watch = FactWatch(TaskHandle::begin(Sender::new(&self.machine.inbox()), question));
+        self.call_embedding("%AWAIT-WATCH", &[teller])?;
+        Ok(watch)
     }
 }

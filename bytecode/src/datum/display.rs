@@ -53,23 +53,29 @@ fn display(datum: &Datum, f: &mut fmt::Formatter<'_>, depth: u32) -> fmt::Result
             }
             f.write_str(")")
         }
-        DatumKind::Vector(items) => display_items(items, "#(", f, depth),
+        DatumKind::Vector(items) => display_items(items, ["#(", ")"], f, depth),
         DatumKind::Array(dimensions, items) => {
-            display_items(items, &format!("#{}A(", dimensions.len()), f, depth)
+            display_items(items, [&format!("#{}A(", dimensions.len()), ")"], f, depth)
         }
+        DatumKind::Table(items) => display_items(items, ["#<hash-table ", ">"], f, depth),
     }
 }
 
-fn display_items(items: &[Datum], open: &str, f: &mut fmt::Formatter<'_>, depth: u32) -> fmt::Result {
+fn display_items(
+    items: &[Datum],
+    [open, close]: [&str; 2],
+    f: &mut fmt::Formatter<'_>,
+    depth: u32,
+) -> fmt::Result {
     f.write_str(open)?;
     for (i, item) in items.iter().enumerate() {
         if i > 0 {
             f.write_str(" ")?;
         }
         if i == DISPLAY_LENGTH {
-            return f.write_str("...)");
+            return write!(f, "...{close}");
         }
         display(item, f, depth + 1)?;
     }
-    f.write_str(")")
+    f.write_str(close)
 }

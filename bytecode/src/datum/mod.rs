@@ -54,6 +54,9 @@ pub enum DatumKind {
     Array(Arc<[u32]>, Arc<[Datum]>),
     /// A vector of numbers, from or for the host. No text denotes it.
     Packed(PackedVector),
+    /// A hash table, from or for the host: its keys, each followed by its value. The program compares the keys
+    /// by `equal`; of equal keys, the last one counts. No text denotes it.
+    Table(Arc<[Datum]>),
     /// Some object of the running program.
     Object(ObjectId),
     /// Something of the embedder's.
@@ -79,7 +82,7 @@ impl OpaqueDatum {
         OpaqueDatum { kind: kind.into(), text: text.into(), value }
     }
 
-    /// Creates a datum for an object of a program that no data stands for, such as a task or a hash table,
+    /// Creates a datum for an object of a program that no data stands for, such as a task,
     /// with a short text that describes it. It does not lead back to the object.
     pub fn of_program(text: &str) -> OpaqueDatum {
         OpaqueDatum { kind: "".into(), text: text.into(), value: Arc::new(ProgramObject) }
@@ -162,7 +165,7 @@ fn contents(kind: &DatumKind) -> u8 {
     let of_items = |items: &[Datum]| items.iter().fold(0, |all, item| all | item.0.contents);
     match kind {
         DatumKind::Cons(car, cdr) => car.0.contents | cdr.0.contents,
-        DatumKind::Vector(items) | DatumKind::Array(_, items) => of_items(items),
+        DatumKind::Vector(items) | DatumKind::Array(_, items) | DatumKind::Table(items) => of_items(items),
         DatumKind::Call(call) => HAS_CALLS | call.0.contents,
         DatumKind::Object(_) => HAS_OBJECTS,
         _ => 0,
@@ -280,7 +283,11 @@ impl Datum {
         matches!(
             self.plain_kind(),
             None | Some(
-                DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) | DatumKind::Call(_)
+                DatumKind::Cons(..)
+                    | DatumKind::Vector(_)
+                    | DatumKind::Array(..)
+                    | DatumKind::Table(_)
+                    | DatumKind::Call(_)
             )
         )
     }
@@ -414,18 +421,18 @@ impl DatumRemains {
 
 /// Moves the children of a node that is about to go to `orphans`, leaving the node flat.
 fn release(kind: &mut NodeContents, orphans: &mut Vec<Datum>) {
-    use DatumKind::{Array, Call, Cons, Vector};
+    use DatumKind::{Array, Call, Cons, Table, Vector};
     let kind = match kind {
         NodeContents::Plain(kind) => kind,
         NodeContents::Properties(properties) => return orphans.extend(properties.take_data()),
     };
-    if !matches!(kind, Cons(..) | Vector(..) | Array(..) | Call(_)) {
+    if !matches!(kind, Cons(..) | Vector(_) | Array(..) | Table(_) | Call(_)) {
         return;
     }
     match std::mem::replace(kind, DatumKind::Nil) {
         DatumKind::Cons(car, cdr) => orphans.extend([cdr, car]),
         DatumKind::Call(call) => orphans.push(call),
-        DatumKind::Vector(mut items) | DatumKind::Array(_, mut items) => {
+        DatumKind::Vector(mut items) | DatumKind::Array(_, mut items) | DatumKind::Table(mut items) => {
             // A shared slice is left to its last owner.
             if let Some(items) = Arc::get_mut(&mut items) {
                 let hole = Datum::nil(Span::default());

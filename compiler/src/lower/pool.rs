@@ -124,7 +124,9 @@ impl Pool {
             DatumKind::String(text) => Constant::String(text.clone()),
             DatumKind::Object(id) => Constant::Object(*id),
             // Calls have been made before a form is compiled; what is the embedder's is in no form.
-            DatumKind::Call(_) | DatumKind::Opaque(_) | DatumKind::Packed(_) => Constant::Nil,
+            DatumKind::Call(_) | DatumKind::Opaque(_) | DatumKind::Packed(_) | DatumKind::Table(_) => {
+                Constant::Nil
+            }
             DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => {
                 unreachable!("compound data are handled by the caller")
             }
@@ -163,6 +165,7 @@ fn key(datum: &Datum) -> LiteralKey {
         | DatumKind::Array(..)
         | DatumKind::Opaque(_)
         | DatumKind::Packed(_)
+        | DatumKind::Table(_)
         | DatumKind::Call(_) => LiteralKey::Node(datum.identity()),
     }
 }

@@ -88,6 +88,7 @@ fn print_one<'a>(
         DatumKind::Object(ObjectId(id)) => write!(out, "#<object {id}>"),
         DatumKind::Opaque(opaque) => write!(out, "{opaque}"),
         DatumKind::Packed(vector) => write!(out, "{vector}"),
+        DatumKind::Table(_) => write!(out, "{datum}"),
         DatumKind::Call(call) => {
             out.push_str("#.");
             work.push(PrintStep::Datum(call, level, true));

@@ -27,8 +27,16 @@ impl Reading<'_> {
     }
 }
 
+/// Returns the keys and values of a hash table, a property list or an association list.
+fn entries(data: &Data) -> Option<Vec<(Data, Data)>> {
+    match data {
+        Data::Table(entries) => Some(entries.clone()),
+        list => pairs(list.as_list()?),
+    }
+}
+
 /// Returns the keys and values of a property list or an association list.
-fn entries(items: &[Data]) -> Option<Vec<(Data, Data)>> {
+fn pairs(items: &[Data]) -> Option<Vec<(Data, Data)>> {
     let is_pair = |item: &Data| matches!(item, Data::List(_) | Data::DottedList(..));
     if items.iter().all(is_pair) {
         return items.iter().map(entry).collect();
@@ -88,6 +96,7 @@ impl<'de> de::Deserializer<'de> for Reading<'_> {
                 visitor.visit_string(field_name(self.0).unwrap_or_default())
             }
             Data::List(items) | Data::Vector(items) => visitor.visit_seq(Sequence(items.iter())),
+            Data::Table(entries) => visitor.visit_map(Entries::new(entries.clone(), None)),
             Data::Packed(vector) => visit_packed(vector, visitor),
             Data::Ratio(..) | Data::DottedList(..) => self.is_not("a number or a list"),
             Data::Opaque(_) => self.is_not("data"),
@@ -158,9 +167,9 @@ impl<'de> de::Deserializer<'de> for Reading<'_> {
     }
 
     fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, StructureError> {
-        match self.0.as_list().and_then(entries) {
+        match entries(self.0) {
             Some(entries) => visitor.visit_map(Entries::new(entries, None)),
-            None => self.is_not("a property list or an association list"),
+            None => self.is_not("a property list, an association list or a hash table"),
         }
     }
 
@@ -170,9 +179,9 @@ impl<'de> de::Deserializer<'de> for Reading<'_> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, StructureError> {
-        match self.0.as_list().and_then(entries) {
+        match entries(self.0) {
             Some(entries) => visitor.visit_map(Entries::new(entries, Some(fields))),
-            None => self.is_not("a property list or an association list"),
+            None => self.is_not("a property list, an association list or a hash table"),
         }
     }
 
@@ -305,7 +314,7 @@ impl<'de> VariantAccess<'de> for Variant<'_> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, StructureError> {
-        match entries(self.rest) {
+        match pairs(self.rest) {
             Some(entries) => visitor.visit_map(Entries::new(entries, Some(fields))),
             None => Err(StructureError(format!("expected fields behind {}", keyword(self.variant)))),
         }

@@ -17,6 +17,7 @@ mod environment;
 mod packed;
 mod parts;
 mod properties;
+mod table;
 mod walk;
 
 use std::collections::BTreeMap;
@@ -247,7 +248,7 @@ impl Unit {
                         DatumKind::Cons(car, cdr) => {
                             steps.extend([ToValue::Build(datum), ToValue::Visit(cdr), ToValue::Visit(car)]);
                         }
-                        DatumKind::Vector(items) | DatumKind::Array(_, items) => {
+                        DatumKind::Vector(items) | DatumKind::Array(_, items) | DatumKind::Table(items) => {
                             // Its elements may be those of another vector too.
                             remembers_all |= Arc::strong_count(items) > 1;
                             steps.push(ToValue::Build(datum));
@@ -265,7 +266,9 @@ impl Unit {
                 }
                 ToValue::Build(datum) => {
                     let count = match datum.kind() {
-                        DatumKind::Vector(items) | DatumKind::Array(_, items) => items.len(),
+                        DatumKind::Vector(items) | DatumKind::Array(_, items) | DatumKind::Table(items) => {
+                            items.len()
+                        }
                         DatumKind::Call(_) => 1,
                         _ => 2,
                     };
@@ -274,6 +277,7 @@ impl Unit {
                     let value = match datum.kind() {
                         DatumKind::Vector(_) => heap.alloc_vector(parts)?,
                         DatumKind::Array(dimensions, _) => array(heap, dimensions, parts)?,
+                        DatumKind::Table(_) => table::value_of(heap, parts)?,
                         DatumKind::Call(_) => {
                             self.calls.push(parts[0]);
                             parts[0]
@@ -328,6 +332,7 @@ impl Unit {
             | DatumKind::Cons(..)
             | DatumKind::Vector(_)
             | DatumKind::Array(..)
+            | DatumKind::Table(_)
             | DatumKind::Call(_) => Value::NIL,
         })
     }

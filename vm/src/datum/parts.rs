@@ -5,6 +5,7 @@ use esl_bytecode::span::Span;
 
 use super::walk::{ObjectParts, parts_of};
 use crate::heap::Heap;
+use crate::table::Table;
 use crate::value::Value;
 
 /// Returns a new datum for an object with these parts.
@@ -21,8 +22,11 @@ pub(super) fn datum_with(heap: &Heap, object: Value, parts: Vec<Datum>, span: Sp
                 _ => Datum::nil(span),
             }
         }
-        // Only for the embedder vectors of all kinds have parts.
-        Some(ObjectParts::Items(None, _)) | None => Datum::new(DatumKind::Vector(parts.into()), span),
+        // Tables, and vectors of all kinds, have parts for the embedder only.
+        None if Table::of(heap, object).is_some() => Datum::new(DatumKind::Table(parts.into()), span),
+        Some(ObjectParts::Items(None, _) | ObjectParts::Entries(_)) | None => {
+            Datum::new(DatumKind::Vector(parts.into()), span)
+        }
     }
 }
 

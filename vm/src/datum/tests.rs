@@ -3,6 +3,9 @@ use esl_bytecode::BigInt;
 use esl_bytecode::properties::PropertyValue;
 use esl_bytecode::span::SourceId;
 
+use crate::equality::KeyTest;
+use crate::table::{KeyComparison, Table};
+
 struct Fixture {
     heap: Heap,
     names: Names,
@@ -208,6 +211,28 @@ fn a_property_list_of_the_host_is_the_list_that_it_stands_for_and_costs_as_much(
         let last = (0..6).fold(rest, |rest, _| heap.cdr(rest).unwrap());
         assert_eq!(heap.car(rest).unwrap(), heap.car(last).unwrap());
     }
+}
+
+#[test]
+fn tables_cross_the_border_with_their_entries() {
+    let mut fixture = Fixture::new();
+    let text = |text: &str| Datum::string(text, Span::default());
+    let entries = [text("a"), int(1, 0), text("b"), Datum::list([int(2, 0)], at(0)), text("a"), int(3, 0)];
+    let datum = Datum::new(DatumKind::Table(entries.into()), Span::default());
+    let (table, work) = import(&mut fixture.heap, &mut fixture.names, &datum).unwrap();
+    assert_eq!(work, 8);
+    let (datum, work) = export(&fixture.heap, &fixture.names, table, |_, _| "other".into()).unwrap();
+    assert_eq!((datum.to_string().as_str(), work), ("#<hash-table \"a\" 3 \"b\" (2)>", 7));
+    let test = KeyComparison::Native(KeyTest::Equalp);
+    let table = Table::make(&mut fixture.heap, test, 1, [Value::NIL; 2]).unwrap();
+    let (datum, _) = export(&fixture.heap, &fixture.names, table, |_, _| "other".into()).unwrap();
+    assert_eq!(datum.to_string(), "other");
+    // One that contains itself.
+    let test = KeyComparison::Native(KeyTest::Eql);
+    let table = Table::make(&mut fixture.heap, test, 1, [Value::NIL; 2]).unwrap();
+    Table::of(&fixture.heap, table).unwrap().add(&mut fixture.heap, 7, Value::T, table).unwrap();
+    let refused = export(&fixture.heap, &fixture.names, table, |_, _| String::new());
+    assert_eq!(refused.map(|(datum, _)| datum.to_string()), Err(DatumError::Circular));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_heap::array::{ArrayElements, vector_elements};
 
-use super::{DatumError, MAX_NODES, NODE_BYTES, Unit, packed, work_of};
+use super::{DatumError, MAX_NODES, NODE_BYTES, Unit, packed, table, work_of};
 use crate::heap::layout::Array;
 use crate::heap::{Heap, Kind};
 use crate::names::load::integer_of;
@@ -152,8 +152,11 @@ impl DatumWalk {
                         continue;
                     }
                     let parts = parts_of(heap, object);
-                    let parts =
-                        parts.or_else(|| vector_parts(heap, object).filter(|_| unit.describe.is_some()));
+                    let parts = parts.or_else(|| {
+                        unit.describe?;
+                        vector_parts(heap, object)
+                            .or_else(|| table::entries_of(heap, object).map(ObjectParts::Entries))
+                    });
                     let Some(parts) = parts else {
                         self.made.push(unit.atom_datum(heap, names, object, span));
                         continue;
@@ -166,6 +169,7 @@ impl DatumWalk {
                             let count = match &parts {
                                 ObjectParts::Pair(..) => 2,
                                 ObjectParts::Items(_, items) => items.len(),
+                                ObjectParts::Entries(entries) => entries.len(),
                             };
                             if self.keeps_literals
                                 && let Some(quoted) = quoted_in(heap, names, object)
@@ -211,7 +215,7 @@ fn is_large(heap: &Heap, object: Value) -> bool {
                 nodes += items.len();
                 pending.extend(items.iter().take(LARGE));
             }
-            None => {}
+            Some(ObjectParts::Entries(_)) | None => {}
         }
         if nodes > LARGE {
             return true;
@@ -241,6 +245,8 @@ pub(super) enum ObjectParts<'a> {
     Pair(Value, Value),
     /// Dimensions (unless it is a simple vector) and elements.
     Items(Option<&'a [Value]>, &'a [Value]),
+    /// The keys of a hash table, each followed by its value.
+    Entries(Vec<Value>),
 }
 
 pub(super) fn parts_of(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
@@ -277,6 +283,7 @@ fn visit_parts(parts: ObjectParts<'_>, steps: &mut Vec<ToDatum>) {
     match parts {
         ObjectParts::Pair(car, cdr) => steps.extend([ToDatum::Visit(cdr), ToDatum::Visit(car)]),
         ObjectParts::Items(_, items) => steps.extend(items.iter().rev().copied().map(ToDatum::Visit)),
+        ObjectParts::Entries(entries) => steps.extend(entries.into_iter().rev().map(ToDatum::Visit)),
     }
 }
 

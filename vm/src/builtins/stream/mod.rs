@@ -29,9 +29,7 @@ mod read;
 mod text;
 mod write;
 
-pub(super) use channel::{
-    channel_handler, channel_output, channel_state, make_channel, supply_channel,
-};
+pub(super) use channel::{channel_handler, channel_output, channel_state, make_channel, supply_channel};
 pub(super) use file::{delete_file, file_bytes, file_error, file_exists_p, file_text, right_to, write_bytes};
 pub(super) use read::{line_piece, listen, peek_char, read_char, read_char_no_hang, read_line, unread_char};
 pub(super) use text::{
