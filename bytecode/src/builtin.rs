@@ -1464,9 +1464,9 @@ macro_rules! for_each_builtin {
             /// Adds characters to those that a channel has to be read; with `NIL`, no more will come until
             /// some are added.
             SupplyChannel = stream::supply_channel, internal "%SUPPLY-CHANNEL" ("channel text") shares own;
-            /// Reads characters up to the end of a line, a string: those that have arrived, and not too many.
-            /// Returns also whether the line has ended with them, and whether the stream has ended before them.
-            /// Waits for standard input, not for a channel.
+            /// Reads characters up to the end of a line, a string: those that have arrived, and not too
+            /// many. Returns also whether the line has ended with them, and whether the stream has ended
+            /// before them. Waits for standard input, not for a channel.
             LinePiece = stream::line_piece, internal "%LINE-PIECE" ("stream") shares own;
             /// The bytes that the characters 0 to 255 of a string stand for; those of the string in UTF-8 if
             /// `as_text`.

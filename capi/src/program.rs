@@ -135,12 +135,12 @@ impl WatcherOfC {
 }
 
 /// Has a function called for each change of a fact that matches a pattern, such as "(at ?robot ?place)", in
-/// the order of the changes, until the watch is freed. With a status other than
-/// `ESL_OK`, `user` is freed at once, otherwise with the engine.
+/// the order of the changes, until the watch is freed. With a status other than `ESL_OK`, `user` is freed at
+/// once, otherwise with the engine.
 ///
 /// # Safety
-/// `engine` is an engine and `pattern` a value; `function` and `destructor` can be called with `user`; `watch`
-/// and `failure` are places that can be written, or null.
+/// `engine` is an engine and `pattern` a value; `function` and `destructor` can be called with `user`;
+/// `watch` and `failure` are places that can be written, or null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn esl_watch_facts(
     engine: *const esl_engine,

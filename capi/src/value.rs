@@ -58,8 +58,8 @@ pub enum esl_kind {
     ESL_FLOATS = 15,
     /// An object of the embedder's.
     ESL_HOST_OBJECT = 16,
-    /// A hash table that compares its keys by `eq`, `eql` or `equal`; its items are its keys, each followed by
-    /// its value.
+    /// A hash table that compares its keys by `eq`, `eql` or `equal`; its items are its keys, each followed
+    /// by its value.
     ESL_TABLE = 17,
 }
 
@@ -217,9 +217,9 @@ pub unsafe extern "C" fn esl_vector(items: *const *const esl_value, count: usize
     making(|| Ok(esl_value(Data::Vector(unsafe { values(items, count) }?))))
 }
 
-/// Creates a hash table of `count` keys and as many values, which are copied: `items` has each key, followed by
-/// its value. The program compares the keys by `equal`; of equal keys, the last one counts. Returns null if one is
-/// null.
+/// Creates a hash table of `count` keys and as many values, which are copied: `items` has each key, followed
+/// by its value. The program compares the keys by `equal`; of equal keys, the last one counts. Returns null
+/// if one is null.
 ///
 /// # Safety
 /// `items` points to twice `count` values.
@@ -439,8 +439,8 @@ pub unsafe extern "C" fn esl_value_count(value: *const esl_value) -> usize {
     }
 }
 
-/// Returns an item of a list, vector or table, from 0. It is a part of the value. Returns null beyond the last, and
-/// for vectors of numbers, whose elements other functions show.
+/// Returns an item of a list, vector or table, from 0. It is a part of the value. Returns null beyond the
+/// last, and for vectors of numbers, whose elements other functions show.
 ///
 /// # Safety
 /// `value` is a value, or null.

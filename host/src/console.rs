@@ -220,8 +220,8 @@ impl Console {
         }
     }
 
-    /// Takes the characters that have arrived up to the end of a line, at most `limit`, and returns whether the
-    /// line has ended with them.
+    /// Takes the characters that have arrived up to the end of a line, at most `limit`, and returns whether
+    /// the line has ended with them.
     pub fn take_line(&mut self, limit: usize) -> (Vec<u32>, bool) {
         let end = self.input.iter().take(limit + 1).position(|&c| c == u32::from('\n'));
         let line = self.input.drain(..end.unwrap_or_else(|| limit.min(self.input.len()))).collect();

@@ -35,8 +35,8 @@ pub(crate) fn held(py: Python<'_>, data: &Data) -> Option<Py<PyAny>> {
 }
 
 /// Something that a program holds and Python does not look into: an object of a module of the library, which
-/// the program gets back as itself, or an object of the program, such as a task or a structure, which does not
-/// return.
+/// the program gets back as itself, or an object of the program, such as a task or a structure, which does
+/// not return.
 #[pyclass(frozen, module = "esl", name = "ProgramObject")]
 pub(crate) struct ProgramObject(Data);
 

@@ -117,7 +117,7 @@ mod tests {
             let test = engine.function(&format!("(lambda (symbol) (eq symbol {text}))")).expect("a function");
             assert_eq!(engine.call(&test, [symbol]), Ok(true), "{text}");
         }
-        let objects = engine.eval("(list (make-hash-table) #'car)").expect("it evaluates");
+        let objects = engine.eval("(list (make-hash-table :test 'equalp) #'car)").expect("it evaluates");
         let objects = objects.as_list().expect("it is a list");
         let is_of_program = |data: &Data| matches!(data, Data::Opaque(opaque) if opaque.is_of_program());
         assert!(objects.iter().all(is_of_program), "{objects:?}");

@@ -54,8 +54,8 @@ pub enum DatumKind {
     Array(Arc<[u32]>, Arc<[Datum]>),
     /// A vector of numbers, from or for the host. No text denotes it.
     Packed(PackedVector),
-    /// A hash table, from or for the host: its keys, each followed by its value. The program compares the keys
-    /// by `equal`; of equal keys, the last one counts. No text denotes it.
+    /// A hash table, from or for the host: its keys, each followed by its value. The program compares the
+    /// keys by `equal`; of equal keys, the last one counts. No text denotes it.
     Table(Arc<[Datum]>),
     /// Some object of the running program.
     Object(ObjectId),

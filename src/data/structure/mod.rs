@@ -2,8 +2,8 @@
 //!
 //! A struct is a property list, whose keys are the names of the fields as keywords, with `-` for `_`. A map
 //! is an association list. A variant of an enum is its keyword, or a list that begins with it. `None` and
-//! `()` are `NIL`. From data a struct is read from a property list, an association list or a hash table, with keys that are
-//! symbols, keywords or strings.
+//! `()` are `NIL`. From data a struct is read from a property list, an association list or a hash table,
+//! with keys that are symbols, keywords or strings.
 
 mod read;
 #[cfg(test)]

@@ -72,7 +72,7 @@ fn association_lists_and_what_is_wrong() {
     assert_eq!(wrong(&Data::list([key("Y-M"), 1_i64.into()])), "missing field `x_m`");
     assert_eq!(
         wrong(&Data::list([key("X-M")])),
-        "expected a property list or an association list, found (:X-M)"
+        "expected a property list, an association list or a hash table, found (:X-M)"
     );
     let mode = |data: Data| data.to_structure::<Mode>();
     assert_eq!(mode(Data::Symbol("IDLE".into())), Ok(Mode::Idle));

@@ -25,9 +25,9 @@ pub(super) fn value_of(heap: &mut Heap, entries: &[Value]) -> Result<Value, Allo
     Ok(object)
 }
 
-/// Returns the entries of a table that compares its keys by `eq`, `eql` or `equal`: keys, each followed by its
-/// value, in the order in which they came. Other tables are not data, since no table that the host makes compares
-/// keys so.
+/// Returns the entries of a table that compares its keys by `eq`, `eql` or `equal`: keys, each followed by
+/// its value, in the order in which they came. Other tables are not data, since no table that the host makes
+/// compares keys so.
 pub(super) fn entries_of(heap: &Heap, object: Value) -> Option<Vec<Value>> {
     let table = Table::of(heap, object)?;
     let KeyComparison::Native(KeyTest::Eq | KeyTest::Eql | KeyTest::Equal) = table.comparison(heap) else {

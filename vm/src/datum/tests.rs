@@ -220,7 +220,7 @@ fn tables_cross_the_border_with_their_entries() {
     let entries = [text("a"), int(1, 0), text("b"), Datum::list([int(2, 0)], at(0)), text("a"), int(3, 0)];
     let datum = Datum::new(DatumKind::Table(entries.into()), Span::default());
     let (table, work) = import(&mut fixture.heap, &mut fixture.names, &datum).unwrap();
-    assert_eq!(work, 8);
+    assert_eq!(work, 9);
     let (datum, work) = export(&fixture.heap, &fixture.names, table, |_, _| "other".into()).unwrap();
     assert_eq!((datum.to_string().as_str(), work), ("#<hash-table \"a\" 3 \"b\" (2)>", 7));
     let test = KeyComparison::Native(KeyTest::Equalp);
