@@ -280,8 +280,8 @@ typedef enum {
    */
   ESL_HOST_OBJECT = 16,
   /**
-   * A hash table that compares its keys by `eq`, `eql` or `equal`; its items are its keys, each followed by
-   * its value.
+   * A hash table that compares its keys by `eq`, `eql` or `equal`; its items are its keys, each followed
+   * by its value.
    */
   ESL_TABLE = 17,
 } esl_kind;
@@ -1120,12 +1120,12 @@ esl_status esl_definitions(const esl_engine *engine,
 
 /**
  * Has a function called for each change of a fact that matches a pattern, such as "(at ?robot ?place)", in
- * the order of the changes, from the next turn on until the watch is freed. With a status other than
- * `ESL_OK`, `user` is freed at once, otherwise with the engine.
+ * the order of the changes, until the watch is freed. With a status other than `ESL_OK`, `user` is freed at
+ * once, otherwise with the engine.
  *
  * The caller sees to it that
- * `engine` is an engine and `pattern` a value; `function` and `destructor` can be called with `user`; `watch`
- * and `failure` are places that can be written, or null.
+ * `engine` is an engine and `pattern` a value; `function` and `destructor` can be called with `user`;
+ * `watch` and `failure` are places that can be written, or null.
  */
 esl_status esl_watch_facts(const esl_engine *engine,
                            const esl_value *pattern,
@@ -1319,15 +1319,14 @@ esl_value *esl_list(const esl_value *const *items, size_t count);
 esl_value *esl_vector(const esl_value *const *items, size_t count);
 
 /**
- * Creates a hash table of `count` keys and as many values, which are copied: `items` has each key, followed by
- * its value. The program compares the keys by `equal`; of equal keys, the last one counts. Returns null if one is
- * null.
+ * Creates a hash table of `count` keys and as many values, which are copied: `items` has each key, followed
+ * by its value. The program compares the keys by `equal`; of equal keys, the last one counts. Returns null
+ * if one is null.
  *
  * The caller sees to it that
  * `items` points to twice `count` values.
  */
-esl_value *esl_table(const esl_value *const *items,
-                     size_t count);
+esl_value *esl_table(const esl_value *const *items, size_t count);
 
 /**
  * Reads a value as programs write it: "(at ?robot (3.5 :north))".
@@ -1434,14 +1433,13 @@ const uint8_t *esl_value_text_bytes(const esl_value *value, size_t *length);
 size_t esl_value_count(const esl_value *value);
 
 /**
- * Returns an item of a list, vector or table, from 0. It is a part of the value. Returns null beyond the last, and
- * for vectors of numbers, whose elements other functions show.
+ * Returns an item of a list, vector or table, from 0. It is a part of the value. Returns null beyond the
+ * last, and for vectors of numbers, whose elements other functions show.
  *
  * The caller sees to it that
  * `value` is a value, or null.
  */
-const esl_value *esl_value_item(const esl_value *value,
-                                size_t index);
+const esl_value *esl_value_item(const esl_value *value, size_t index);
 
 /**
  * Copies the text of a string or a character, or the name of a keyword or symbol, for `esl_text_free`. Null
