@@ -10,7 +10,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::function::Handler;
-use super::{HostFailure, HostOperation, Inbox, Sender};
+use super::{ActionId, HostFailure, HostOperation, Inbox, Sender};
 
 /// The arguments of one call, which are read from left to right.
 pub struct ArgumentReader<'a> {
@@ -85,6 +85,18 @@ impl FromCall for Sender {
 
     fn from_call(call: &mut ArgumentReader<'_>) -> Result<Sender, HostFailure> {
         Ok(Sender::new(call.inbox()))
+    }
+}
+
+/// The identity of the call, if the run keeps account of those: see [`HostOperation::action`].
+#[derive(Clone, Copy, Debug)]
+pub struct CallAction(pub Option<ActionId>);
+
+impl FromCall for CallAction {
+    const COUNT: usize = 0;
+
+    fn from_call(call: &mut ArgumentReader<'_>) -> Result<CallAction, HostFailure> {
+        Ok(CallAction(call.operation().and_then(HostOperation::action)))
     }
 }
 

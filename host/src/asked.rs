@@ -4,8 +4,8 @@
 use esl_bytecode::datum::{Datum, DatumKind};
 
 use super::{
-    Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, HostState, Inbox, Incoming, Input,
-    Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
+    ActionId, Awaited, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, HostState, Inbox,
+    Incoming, Input, Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
 };
 use crate::canary::Canary;
 
@@ -78,9 +78,9 @@ impl Asked {
         self.canary.mix_bytes(bytes);
     }
 
-    fn note_call(&mut self, question: AskedQuestion, name: &str, arguments: &[Datum]) {
-        self.note_bytes(question, name.as_bytes());
-        arguments.iter().for_each(|argument| self.mix_datum(argument));
+    fn note_call(&mut self, question: AskedQuestion, call: HostCall<'_>) {
+        self.note_bytes(question, call.name.as_bytes());
+        call.arguments.iter().for_each(|argument| self.mix_datum(argument));
     }
 
     /// Mixes in a datum: its parts in the order of its text, rare ones as their text.
@@ -264,17 +264,16 @@ impl Host for Asked {
 
     fn call(
         &mut self,
-        name: &str,
-        arguments: &[Datum],
+        call: HostCall<'_>,
         function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
-        self.note_call(AskedQuestion::Call, name, arguments);
-        self.host.call(name, arguments, function)
+        self.note_call(AskedQuestion::Call, call);
+        self.host.call(call, function)
     }
 
-    fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
-        self.note_call(AskedQuestion::Begin, name, arguments);
-        self.host.begin(name, arguments, function);
+    fn begin(&mut self, call: HostCall<'_>, function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
+        self.note_call(AskedQuestion::Begin, call);
+        self.host.begin(call, function);
     }
 
     fn inbox(&self) -> Inbox {
@@ -320,7 +319,12 @@ mod tests {
     }
 
     fn begin_with(host: &mut Asked, argument: Datum) {
-        host.begin("b", &[argument], &mut |_| {});
+        begin(host, "b", &[argument]);
+    }
+
+    fn begin(host: &mut Asked, name: &str, arguments: &[Datum]) {
+        let call = HostCall { name, arguments, effect: crate::CallEffect::Once, operation: Some(1) };
+        host.begin(call, &mut |_, _| {});
     }
 
     #[test]
@@ -344,13 +348,13 @@ mod tests {
             canary(|host| _ = host.delete_file("a")),
             canary(|host| _ = host.permit(Right::Read, "a", &[])),
             canary(|host| _ = host.permit(Right::Write, "a", &[])),
-            canary(|host| host.begin("a", &[], &mut |_| {})),
-            canary(|host| host.begin("b", &[], &mut |_| {})),
-            canary(|host| host.begin("b", &[Datum::nil(Span::default())], &mut |_| {})),
-            canary(|host| host.begin("b", &[Datum::integer(0, Span::default())], &mut |_| {})),
-            canary(|host| host.begin("b", &[Datum::integer(-1, Span::default())], &mut |_| {})),
-            canary(|host| host.begin("b", &[Datum::string("", Span::default())], &mut |_| {})),
-            canary(|host| host.begin("b", &[Datum::string("-1", Span::default())], &mut |_| {})),
+            canary(|host| begin(host, "a", &[])),
+            canary(|host| begin(host, "b", &[])),
+            canary(|host| begin(host, "b", &[Datum::nil(Span::default())])),
+            canary(|host| begin(host, "b", &[Datum::integer(0, Span::default())])),
+            canary(|host| begin(host, "b", &[Datum::integer(-1, Span::default())])),
+            canary(|host| begin(host, "b", &[Datum::string("", Span::default())])),
+            canary(|host| begin(host, "b", &[Datum::string("-1", Span::default())])),
             canary(|host| begin_with(host, atom(DatumKind::Float(-1.0)))),
             canary(|host| begin_with(host, atom(DatumKind::Float(1.0)))),
             canary(|host| begin_with(host, atom(DatumKind::Character('a')))),

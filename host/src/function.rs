@@ -22,7 +22,7 @@ use esl_bytecode::datum::Datum;
 
 use super::argument::{ArgumentList, ArgumentReader};
 use super::value::{HostHandle, HostObject, IntoDatum, IntoValues};
-use super::{HostFailure, HostOperation, Inbox, Right};
+use super::{CallEffect, HostFailure, HostOperation, Inbox, Right};
 
 /// Code of the host that takes and returns data, and cannot call back.
 pub type DataFunction = Box<dyn FnMut(&[Datum]) -> Result<Datum, HostFailure> + Send>;
@@ -67,6 +67,8 @@ pub struct HostRow {
     pub needs: Vec<Need>,
     /// Whether it reaches nothing outside of the process, so that it is there in every world.
     pub is_everywhere: bool,
+    /// The effect of a call made twice.
+    pub effect: CallEffect,
     /// The code.
     pub function: HostFunction,
 }
@@ -91,6 +93,24 @@ impl HostRow {
     /// Has the function be there in every world: it reaches nothing outside of the process.
     pub fn everywhere(&mut self) -> &mut HostRow {
         self.is_everywhere = true;
+        self.local()
+    }
+
+    /// Notes that a call reaches nothing outside of the process.
+    pub fn local(&mut self) -> &mut HostRow {
+        self.effect = CallEffect::Local;
+        self
+    }
+
+    /// Notes that a call may be made twice: it only reads, or the second time changes nothing.
+    pub fn idempotent(&mut self) -> &mut HostRow {
+        self.effect = CallEffect::Idempotent;
+        self
+    }
+
+    /// Notes that a call closes one of its arguments.
+    pub fn closes(&mut self) -> &mut HostRow {
+        self.effect = CallEffect::Closes;
         self
     }
 }
@@ -144,6 +164,7 @@ impl HostRows {
             made += 1;
             Ok(HostHandle::new(made, T::default()))
         })
+        .local()
     }
 
     /// Adds a function whose calls are operations: `begin` begins the future that its Rust code returns.
@@ -183,7 +204,9 @@ impl HostRows {
         function: HostFunction,
     ) -> &mut HostRow {
         let needs = Vec::new();
-        self.rows.push(HostRow { name, parameters, documentation, needs, is_everywhere: false, function });
+        let (is_everywhere, effect) = (false, CallEffect::default());
+        let row = HostRow { name, parameters, documentation, needs, is_everywhere, effect, function };
+        self.rows.push(row);
         self.rows.last_mut().expect("one was added")
     }
 

@@ -11,7 +11,7 @@ use std::fmt;
 
 use esl_bytecode::datum::Datum;
 
-use super::{HostFailure, Inbox, Incoming, Permit, Right, Rights};
+use super::{ActionId, HostCall, HostFailure, Inbox, Incoming, Permit, Right, Rights};
 
 /// A stream that bytes are written to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -275,18 +275,16 @@ pub trait Host {
     /// The failure of the function.
     fn call(
         &mut self,
-        name: &str,
-        arguments: &[Datum],
+        call: HostCall<'_>,
         function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
-        let _ = name;
-        function(arguments)
+        function(call.arguments)
     }
 
-    /// Has an operation begun by a function of the embedder's. The inbox hears of it.
-    fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
-        let _ = name;
-        function(arguments);
+    /// Has an operation begun by a function of the embedder's, which is given the identity of the call if the
+    /// host keeps account of those. The inbox hears of the operation.
+    fn begin(&mut self, call: HostCall<'_>, function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
+        function(call.arguments, None);
     }
 
     /// Returns the inbox of the machine that this is the host of.

@@ -36,6 +36,7 @@ mod argument;
 mod asked;
 mod canary;
 mod console;
+mod effect;
 mod external_clock;
 mod function;
 mod host;
@@ -58,7 +59,8 @@ mod task_tree;
 mod value;
 mod virtual_host;
 
-pub use argument::{ArgumentList, ArgumentReader, FromArgument, FromCall, Payload};
+pub use argument::{ArgumentList, ArgumentReader, CallAction, FromArgument, FromCall, Payload};
+pub use effect::{ActionId, CallEffect, GoneObject, HostCall, has_gone_object};
 pub use external_clock::ClockStep;
 pub use function::{
     BeginFuture, Completion, DataFunction, Handler, HostFunction, HostModule, HostRow, HostRows, Need,
@@ -74,7 +76,7 @@ pub use operation::{HostFailure, HostOperation, News};
 pub use question::{Answer, FunctionRef, Kept, Pending, Question, TaskInfo};
 pub use real::{RealHost, Screen};
 pub use real_files::request_of_files;
-pub use record::{NotedRecord, QuestionHash, Record, Recorder, Recording, RecordingHost};
+pub use record::{Intent, NotedRecord, QuestionHash, Record, Recorder, Recording, RecordingHost};
 pub use replay::{Divergence, ReplayHost};
 pub use rights::{Permit, Right, Rights};
 pub use sender::{SendError, Sender};

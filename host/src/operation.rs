@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_bytecode::datum::Datum;
 
-use super::{Inbox, Incoming};
+use super::{ActionId, Inbox, Incoming};
 
 /// A failure as it crosses the border between a program and its host, in either direction.
 #[derive(Clone, Debug)]
@@ -110,6 +110,7 @@ pub struct HostOperation {
     arguments: Vec<Datum>,
     inbox: Inbox,
     canceller: Canceller,
+    action: Option<ActionId>,
     is_over: bool,
 }
 
@@ -117,7 +118,22 @@ impl HostOperation {
     /// Begins the operation with this number, of which the inbox will hear.
     #[doc(hidden)]
     pub fn new(number: u64, arguments: Vec<Datum>, inbox: Inbox, canceller: Canceller) -> HostOperation {
-        HostOperation { number, arguments, inbox, canceller, is_over: false }
+        HostOperation { number, arguments, inbox, canceller, action: None, is_over: false }
+    }
+
+    /// Gives it the identity of its call.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_action(mut self, action: Option<ActionId>) -> HostOperation {
+        self.action = action;
+        self
+    }
+
+    /// Returns the identity of the call, in a durable run: the same if the run makes the call again in
+    /// another process because it does not know whether it was made. A service that knows such keys performs
+    /// the call once.
+    pub fn action(&self) -> Option<ActionId> {
+        self.action
     }
 
     /// Returns its number, unique in the machine.

@@ -50,6 +50,8 @@ pub struct RealHost {
     outputs: [OutputState; 2],
     /// Destination of both output streams, in place of the process's own.
     screen: Option<Screen>,
+    /// Nanoseconds of the program's clock at the start.
+    elapsed: u64,
     /// Nanoseconds of virtual time, if time is virtual.
     virtual_time: Option<u64>,
     /// Whether the outside tells the time.
@@ -72,6 +74,7 @@ impl RealHost {
             #[cfg(unix)]
             outputs: Default::default(),
             screen: None,
+            elapsed: 0,
             virtual_time: None,
             is_external: false,
             speed: 1.0,
@@ -97,6 +100,14 @@ impl RealHost {
     #[must_use]
     pub fn with_virtual_time(mut self) -> RealHost {
         self.virtual_time = Some(0);
+        self
+    }
+
+    /// Starts the program's clock at this number of nanoseconds, as for a run that goes on.
+    #[must_use]
+    pub fn with_elapsed(mut self, nanoseconds: u64) -> RealHost {
+        self.elapsed = nanoseconds;
+        self.virtual_time = self.virtual_time.map(|_| nanoseconds);
         self
     }
 
@@ -197,7 +208,7 @@ impl Host for RealHost {
         match self.virtual_time {
             Some(time) => time,
             None if self.is_external => self.inbox.external_clock().elapsed(),
-            None => nanoseconds(scaled(self.start.elapsed(), self.speed)),
+            None => self.elapsed.saturating_add(nanoseconds(scaled(self.start.elapsed(), self.speed))),
         }
     }
 

@@ -13,8 +13,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use esl_bytecode::datum::{Datum, DatumKind};
 
 use super::{
-    Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output, Permit,
-    Right, Rights, RunCheck, Wake, WriteMode,
+    ActionId, Awaited, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, Inbox, Incoming,
+    Input, Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
 };
 use crate::canary::Canary;
 
@@ -48,11 +48,23 @@ impl QuestionHash {
         QuestionHash::of(&[&[right as u8], object.as_bytes()])
     }
 
-    pub(super) fn of_write_file(path: &str, bytes: &[u8], mode: WriteMode) -> QuestionHash {
+    /// Returns the hash of a write to a file.
+    pub fn of_write_file(path: &str, bytes: &[u8], mode: WriteMode) -> QuestionHash {
         QuestionHash::of(&[path.as_bytes(), bytes, &[mode as u8]])
     }
 
-    pub(super) fn of_call(name: &str, arguments: &[Datum]) -> QuestionHash {
+    /// Returns the hash of a request of files that has one name for its argument.
+    pub fn of_path(path: &str) -> QuestionHash {
+        QuestionHash::of(&[path.as_bytes()])
+    }
+
+    /// Returns the hash of a request of files.
+    pub fn of_request(request: &FileRequest<'_>) -> QuestionHash {
+        QuestionHash::of(&[format!("{request:?}").as_bytes()])
+    }
+
+    /// Returns the hash of a call of a function of the embedder's.
+    pub fn of_call(name: &str, arguments: &[Datum]) -> QuestionHash {
         let contents = |argument: &Datum| match argument.kind() {
             DatumKind::Packed(vector) => vector.to_le_bytes().into_owned(),
             _ => argument.to_string().into_bytes(),
@@ -62,6 +74,17 @@ impl QuestionHash {
         parts.extend(contents.iter().map(Vec::as_slice));
         QuestionHash::of(&parts)
     }
+}
+
+/// An effect that is about to leave the process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Intent {
+    /// Identity of the effect.
+    pub action: ActionId,
+    /// Number of the operation that begins, if one does.
+    pub operation: Option<u64>,
+    /// State of the file that is to be changed: one more than its length, or 0 if there is none.
+    pub before: u64,
 }
 
 /// A record, and the question that it answers.
@@ -150,6 +173,9 @@ define_records! {
     Received((u64, Vec<Incoming>));
     /// How far the run was.
     Checked(RunCheck);
+    /// An effect that was about to leave. Its outcome follows: the answer to the question, or news of the
+    /// operation. Only the journals of durable runs have it.
+    Intended(Intent);
 }
 
 impl Record {
@@ -176,6 +202,7 @@ impl Record {
             Record::Due(_) => "a time that has come",
             Record::Received(_) => "something that came into the inbox",
             Record::Checked(_) => "a check",
+            Record::Intended(_) => "an effect",
         }
     }
 }
@@ -240,6 +267,63 @@ impl<H: Host, R: Recorder> RecordingHost<H, R> {
     /// Records the answers of `host` with `recorder`.
     pub fn with_recorder(host: H, recorder: R) -> RecordingHost<H, R> {
         RecordingHost { host, recorder, not_due: 0, checked: None }
+    }
+
+    /// Continues the records of an earlier process of the run, in which `not_due` questions whether a timer
+    /// is due were answered no.
+    pub fn go_on(&mut self, not_due: u64) {
+        self.not_due = not_due;
+    }
+
+    /// Returns the host, for questions that are not recorded.
+    pub fn host_mut(&mut self) -> &mut H {
+        &mut self.host
+    }
+
+    /// Records that an effect is about to leave.
+    pub fn note_intent(&self, question: QuestionHash, intent: Intent) {
+        self.note(question, Intended(intent));
+    }
+
+    /// Records this as the answer to a call, in place of making it.
+    ///
+    /// # Errors
+    /// The failure that is recorded.
+    pub fn answer_call(
+        &self,
+        call: HostCall<'_>,
+        answer: Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
+        self.note(QuestionHash::of_call(call.name, call.arguments), Called(answer)).0
+    }
+
+    /// Records this as the answer to a write to a file or its removal, in place of doing it.
+    ///
+    /// # Errors
+    /// The error that is recorded.
+    pub fn answer_write(
+        &self,
+        question: QuestionHash,
+        answer: Result<(), HostError>,
+    ) -> Result<(), HostError> {
+        self.note(question, Written(answer)).0
+    }
+
+    /// Records this as the answer to a request of files, in place of carrying it out.
+    ///
+    /// # Errors
+    /// The error that is recorded.
+    pub fn answer_request(
+        &self,
+        question: QuestionHash,
+        answer: Result<FileAnswer, HostError>,
+    ) -> Result<FileAnswer, HostError> {
+        self.note(question, Filed(answer)).0
+    }
+
+    /// Counts a question whether a timer is due that is answered no without the host.
+    pub fn answer_not_due(&mut self) {
+        self.not_due += 1;
     }
 
     fn note<A: RecordedAnswer>(&self, question: QuestionHash, answer: A) -> A {
@@ -323,7 +407,7 @@ impl<H: Host, R: Recorder> Host for RecordingHost<H, R> {
 
     fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
         let answer = Filed(self.host.request_of_files(request));
-        self.note(QuestionHash::of(&[format!("{request:?}").as_bytes()]), answer).0
+        self.note(QuestionHash::of_request(&request), answer).0
     }
 
     fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {
@@ -333,7 +417,7 @@ impl<H: Host, R: Recorder> Host for RecordingHost<H, R> {
 
     fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
         let answer = FileRead(self.host.read_file(path));
-        self.note(QuestionHash::of(&[path.as_bytes()]), answer).0
+        self.note(QuestionHash::of_path(path), answer).0
     }
 
     fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
@@ -343,12 +427,12 @@ impl<H: Host, R: Recorder> Host for RecordingHost<H, R> {
 
     fn file_exists(&mut self, path: &str) -> bool {
         let answer = Exists(self.host.file_exists(path));
-        self.note(QuestionHash::of(&[path.as_bytes()]), answer).0
+        self.note(QuestionHash::of_path(path), answer).0
     }
 
     fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
         let answer = Written(self.host.delete_file(path));
-        self.note(QuestionHash::of(&[path.as_bytes()]), answer).0
+        self.note(QuestionHash::of_path(path), answer).0
     }
 
     fn due(&mut self, deadline: u64) -> Option<u64> {
@@ -361,16 +445,15 @@ impl<H: Host, R: Recorder> Host for RecordingHost<H, R> {
 
     fn call(
         &mut self,
-        name: &str,
-        arguments: &[Datum],
+        call: HostCall<'_>,
         function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
-        let answer = Called(self.host.call(name, arguments, function));
-        self.note(QuestionHash::of_call(name, arguments), answer).0
+        let answer = Called(self.host.call(call, function));
+        self.note(QuestionHash::of_call(call.name, call.arguments), answer).0
     }
 
-    fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
-        self.host.begin(name, arguments, function);
+    fn begin(&mut self, call: HostCall<'_>, function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
+        self.host.begin(call, function);
     }
 
     fn inbox(&self) -> Inbox {

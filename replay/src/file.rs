@@ -16,6 +16,9 @@
 //! Each frame of records holds those that were made between two writes to the file. The last one is the end:
 //! how the run has ended.
 //!
+//! The journal of a durable run is such a file that several processes have written, one after the other; it
+//! has frames of further kinds (`journal`).
+//!
 //! A run may be killed, so the last frame may be torn: then it is as if it had not been written. Anything
 //! else that is wrong means that the file was changed, and it is refused.
 //!
@@ -29,8 +32,8 @@ use esl_host::{NotedRecord, Right, RunCheck};
 use esl_vm::embed::Need;
 use esl_vm::vm::Config;
 
+use super::journal::RunJournal;
 use super::pack::{ByteReader, ByteWriter};
-use super::records::{self, Before};
 
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
@@ -38,18 +41,21 @@ pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
 pub const FORMAT: u32 = 6;
 
 /// Length of what is before the content of a frame.
-const FRAME: usize = 11;
+pub(super) const FRAME: usize = 11;
 /// Content above this size is compressed.
-const COMPRESSED_ABOVE: usize = 4096;
+pub(super) const COMPRESSED_ABOVE: usize = 4096;
 /// Most bytes that lz4 makes of one.
 const EXPANSION: usize = 255;
 
 /// Kinds of frames.
-mod kind {
-    pub(super) const HEADER: u8 = 1;
-    pub(super) const RECORDS: u8 = 2;
-    pub(super) const COMPRESSED: u8 = 3;
-    pub(super) const END: u8 = 4;
+pub(super) mod kind {
+    pub(crate) const HEADER: u8 = 1;
+    pub(crate) const RECORDS: u8 = 2;
+    pub(crate) const COMPRESSED: u8 = 3;
+    pub(crate) const END: u8 = 4;
+    pub(crate) const LIFE: u8 = 5;
+    pub(crate) const MARKED: u8 = 6;
+    pub(crate) const MARKED_COMPRESSED: u8 = 7;
 }
 
 /// A function of the embedder's, as a replay has to know it.
@@ -84,6 +90,18 @@ pub struct Beginning {
     pub has_operators: bool,
     /// Identity of the machine and its library.
     pub(super) identity: String,
+}
+
+impl Beginning {
+    /// Returns the identity of the machine and its library that the run has begun on.
+    pub fn identity(&self) -> &str {
+        &self.identity
+    }
+
+    /// Returns whether that is the identity of this machine.
+    pub fn is_of_this_machine(&self) -> bool {
+        is_own(&self.identity)
+    }
 }
 
 /// How a run has ended.
@@ -189,7 +207,7 @@ pub(super) fn beginning_bytes(beginning: &Beginning) -> Vec<u8> {
     bytes
 }
 
-fn read_beginning(content: &[u8]) -> Option<Beginning> {
+pub(super) fn read_beginning(content: &[u8]) -> Option<Beginning> {
     let mut from = ByteReader(content);
     let identity = from.text()?.into();
     let config = read_config(&mut from)?;
@@ -222,7 +240,7 @@ fn read_beginning(content: &[u8]) -> Option<Beginning> {
     })
 }
 
-fn decompress(bytes: &[u8], length: usize) -> Option<Vec<u8>> {
+pub(super) fn decompress(bytes: &[u8], length: usize) -> Option<Vec<u8>> {
     if length > bytes.len().saturating_mul(EXPANSION) {
         return None;
     }
@@ -279,39 +297,6 @@ fn read_config(from: &mut ByteReader<'_>) -> Option<Config> {
     })
 }
 
-/// Records on their way to a file.
-#[derive(Debug, Default)]
-pub(super) struct Unwritten {
-    packed: ByteWriter,
-    before: Before,
-}
-
-impl Unwritten {
-    /// Adds a record, and returns the number of bytes that wait.
-    pub(super) fn add(&mut self, noted: &NotedRecord) -> usize {
-        records::write(&mut self.packed, noted, &mut self.before);
-        self.packed.0.len()
-    }
-
-    /// Takes what waits as a frame; nothing if nothing does.
-    pub(super) fn take(&mut self) -> Vec<u8> {
-        let content = &mut self.packed.0;
-        let mut bytes = Vec::new();
-        if content.len() > COMPRESSED_ABOVE {
-            let mut out = ByteWriter::default();
-            out.number(content.len() as u64);
-            out.0.extend_from_slice(&lz4_flex::block::compress(content));
-            frame(&mut bytes, kind::COMPRESSED, &out.0);
-        } else if !content.is_empty() {
-            bytes.reserve(FRAME + content.len());
-            frame(&mut bytes, kind::RECORDS, content);
-        }
-        // Its room stays, for the next.
-        content.clear();
-        bytes
-    }
-}
-
 /// Returns the last frame.
 pub(super) fn end_bytes(end: &RecordedEnd) -> Vec<u8> {
     let mut out = ByteWriter::default();
@@ -324,7 +309,7 @@ pub(super) fn end_bytes(end: &RecordedEnd) -> Vec<u8> {
     bytes
 }
 
-fn read_end(content: &[u8]) -> Option<RecordedEnd> {
+pub(super) fn read_end(content: &[u8]) -> Option<RecordedEnd> {
     let mut from = ByteReader(content);
     let status = from.byte()?;
     let (round, ticks) = (from.number()?, from.number()?);
@@ -332,91 +317,13 @@ fn read_end(content: &[u8]) -> Option<RecordedEnd> {
     from.is_empty().then_some(RecordedEnd { status, check })
 }
 
-/// The contents at some place of a file.
-enum FoundFrame<'a> {
-    Frame(u8, &'a [u8]),
-    /// A frame whose writing was interrupted.
-    Torn,
-    Wrong(&'static str),
-}
-
-/// Looks for a frame at the beginning of `bytes`.
-fn find(bytes: &[u8]) -> FoundFrame<'_> {
-    // A system that crashes may leave zeros where nothing was written.
-    let is_unwritten = |bytes: &[u8]| bytes.iter().all(|&byte| byte == 0);
-    let Some((head, rest)) = bytes.split_first_chunk::<FRAME>() else { return FoundFrame::Torn };
-    let word = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
-    let check = u16::from_le_bytes([head[9], head[10]]);
-    if crc32fast::hash(&head[..9]) as u16 != check {
-        return if is_unwritten(bytes) {
-            FoundFrame::Torn
-        } else {
-            FoundFrame::Wrong("no frame begins here")
-        };
-    }
-    let Some((content, rest)) = rest.split_at_checked(word(0) as usize) else { return FoundFrame::Torn };
-    if crc32fast::hash(content) != word(4) {
-        return if is_unwritten(rest) {
-            FoundFrame::Torn
-        } else {
-            FoundFrame::Wrong("the content has another checksum")
-        };
-    }
-    FoundFrame::Frame(head[8], content)
-}
-
 impl Recorded {
-    /// Reads the bytes of a file.
+    /// Reads the bytes of a file, which may be the journal of a durable run.
     ///
     /// # Errors
     /// [`RecordedError`].
     pub fn read(bytes: &[u8]) -> Result<Recorded, RecordedError> {
-        let Some(rest) = bytes.strip_prefix(&MAGIC) else {
-            let is_torn = MAGIC.starts_with(bytes);
-            return Err(if is_torn { RecordedError::NoBeginning } else { RecordedError::NotOne });
-        };
-        let (version, mut rest) = rest.split_first_chunk::<4>().ok_or(RecordedError::NoBeginning)?;
-        let version = u32::from_le_bytes(*version);
-        if version != FORMAT {
-            return Err(RecordedError::Format(version));
-        }
-        let (mut beginning, mut end) = (None, None);
-        let (mut records, mut before) = (Vec::new(), Before::default());
-        let mut is_ours = true;
-        while !rest.is_empty() {
-            let offset = bytes.len() - rest.len();
-            let damaged = |problem| RecordedError::Damaged { offset, problem };
-            let (kind, content) = match find(rest) {
-                FoundFrame::Frame(kind, content) => (kind, content),
-                FoundFrame::Torn => break,
-                FoundFrame::Wrong(problem) => return Err(damaged(problem)),
-            };
-            if end.is_some() || beginning.is_some() == (kind == kind::HEADER) {
-                return Err(damaged("this frame does not belong here"));
-            }
-            // Another machine may have written what this one does not know.
-            if kind == kind::HEADER {
-                is_ours = ByteReader(content).text().is_none_or(is_own);
-            }
-            let strange = |problem| if is_ours { damaged(problem) } else { RecordedError::OtherMachine };
-            let malformed = || strange("the content is not of its kind");
-            match kind {
-                kind::HEADER => beginning = Some(read_beginning(content).ok_or_else(malformed)?),
-                kind::RECORDS => add_records(&mut records, content, &mut before).ok_or_else(malformed)?,
-                kind::COMPRESSED => {
-                    let mut from = ByteReader(content);
-                    let length = from.number().and_then(|length| usize::try_from(length).ok());
-                    let content =
-                        length.and_then(|length| decompress(from.0, length)).ok_or_else(malformed)?;
-                    add_records(&mut records, &content, &mut before).ok_or_else(malformed)?;
-                }
-                kind::END => end = Some(read_end(content).ok_or_else(malformed)?),
-                _ => return Err(strange("a frame of an unknown kind")),
-            }
-            rest = &rest[FRAME + content_length(rest)..];
-        }
-        let beginning = beginning.ok_or(RecordedError::NoBeginning)?;
-        Ok(Recorded { beginning, records: records.into(), end, torn: rest.len() })
+        Ok(RunJournal::read(bytes)?.recorded)
     }
 
     /// Returns the last check of the records.
@@ -431,18 +338,4 @@ impl Recorded {
 /// Returns whether an identity is that of this machine and its library.
 pub(super) fn is_own(identity: &str) -> bool {
     identity == ExecutionIdentity::current().to_string()
-}
-
-/// Returns the length of the content of the frame at the beginning of `bytes`, which is whole.
-fn content_length(bytes: &[u8]) -> usize {
-    bytes.first_chunk().map_or(0, |length| u32::from_le_bytes(*length) as usize)
-}
-
-/// Adds the records of a frame.
-fn add_records(records: &mut Vec<NotedRecord>, content: &[u8], before: &mut Before) -> Option<()> {
-    let mut from = ByteReader(content);
-    while !from.is_empty() {
-        records.push(records::read(&mut from, before)?);
-    }
-    Some(())
 }

@@ -28,6 +28,7 @@
 mod breakpoint;
 mod debugger;
 mod file;
+mod journal;
 mod pack;
 mod pattern;
 mod recorder;
@@ -52,6 +53,7 @@ use esl::program::{self, ExecutionIdentity, Program, Summary};
 pub use breakpoint::{Breakpoint, StopError, Target};
 pub use debugger::Debugger;
 pub use file::{Beginning, FORMAT, GivenFunction, MAGIC, Recorded, RecordedEnd, RecordedError};
+pub use journal::{JournalLife, JournalWriter, RunJournal, journal_beginning, journal_end, journal_life};
 pub use pattern::{FactPattern, NotAPattern};
 pub use recorder::FileRecorder;
 pub use rerun::{Replayed, Rerun, RerunError};

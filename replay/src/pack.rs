@@ -13,6 +13,7 @@ use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
 use esl_bytecode::packed::PackedVector;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Home, Symbol};
+use esl_host::GoneObject;
 use num_bigint::BigInt;
 
 /// Most bytes of an integer of data.
@@ -306,7 +307,9 @@ impl<'a> ByteReader<'a> {
             }
             tag::FLOATS => DatumKind::Packed(PackedVector::Floats(words(self.bytes()?, f64::from_le_bytes)?)),
             // The original is gone with its process; a new object stands for it.
-            tag::OPAQUE => DatumKind::Opaque(OpaqueDatum::new(self.text()?, self.text()?, Arc::new(0_u8))),
+            tag::OPAQUE => {
+                DatumKind::Opaque(OpaqueDatum::new(self.text()?, self.text()?, Arc::new(GoneObject)))
+            }
             _ => return None,
         })
     }

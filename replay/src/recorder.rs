@@ -8,7 +8,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use esl_host::{NotedRecord, Recorder};
 use esl_vm::vm::Vm;
 
-use super::file::{Beginning, RecordedEnd, Unwritten, beginning_bytes, end_bytes};
+use super::file::{Beginning, RecordedEnd, beginning_bytes, end_bytes};
+use super::journal::JournalWriter;
 
 /// Bytes that wait at most, before they are written.
 const BUFFER: usize = 64 << 10;
@@ -16,7 +17,7 @@ const BUFFER: usize = 64 << 10;
 /// The state of a file that is being written.
 struct Writing {
     file: File,
-    pending: Unwritten,
+    pending: JournalWriter,
     has_begun: bool,
     /// The first error; nothing is written after it.
     error: Option<io::Error>,
@@ -45,7 +46,7 @@ impl FileRecorder {
         if file.metadata()?.is_file() {
             file.set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o600))?;
         }
-        let (pending, has_begun, error) = (Unwritten::default(), false, None);
+        let (pending, has_begun, error) = (JournalWriter::default(), false, None);
         Ok(FileRecorder(Arc::new(Mutex::new(Writing { file, pending, has_begun, error }))))
     }
 
@@ -84,7 +85,7 @@ impl Writing {
 
     fn flush(&mut self) {
         if self.has_begun {
-            let bytes = self.pending.take();
+            let bytes = self.pending.take_unmarked();
             self.write(&bytes);
         }
     }

@@ -10,8 +10,8 @@ use std::sync::Arc;
 
 use esl_bytecode::datum::Datum;
 use esl_host::{
-    FileAnswer, FunctionRef, HostError, HostFailure, Incoming, Input, News, NotedRecord, Permit,
-    ProcessSignal, Question, QuestionHash, Record, RunCheck, Wake,
+    ActionId, FileAnswer, FunctionRef, HostError, HostFailure, Incoming, Input, Intent, News, NotedRecord,
+    Permit, ProcessSignal, Question, QuestionHash, Record, RunCheck, Wake,
 };
 
 use super::pack::{ByteReader, ByteWriter};
@@ -23,6 +23,13 @@ pub(super) struct Before {
     not_due: u64,
     check: RunCheck,
     round: u64,
+}
+
+impl Before {
+    /// Returns the last time that was answered.
+    pub(super) fn time(&self) -> u64 {
+        self.time
+    }
 }
 
 /// Data that are written as bytes and read back.
@@ -68,6 +75,16 @@ packed_as! {
             failure.arguments.write(out);
         },
         |from| Some(HostFailure { cause: Packed::read(from)?, arguments: Packed::read(from)? });
+    Intent: |intent, out| {
+            out.0.extend_from_slice(&intent.action.0.to_le_bytes());
+            out.number(intent.operation.unwrap_or(0));
+            out.number(intent.before);
+        },
+        |from| Some(Intent {
+            action: ActionId(u128::from_le_bytes(from.array()?)),
+            operation: Some(from.number()?).filter(|&number| number > 0),
+            before: from.number()?,
+        });
     // Surveys are not recorded.
     Wake: |wake, out| out.byte(match wake {
             Wake::Time => 0,
@@ -176,12 +193,14 @@ packed_by_tag! {
         17 () => { Incoming::Attended };
 }
 
-/// Tags of records that are differences from those before. Tags from 64 to 67 are kept for the intents,
-/// outcomes, choices and snapshots of later versions.
+/// Tags of records that are differences from those before. Tags from 65 to 67 are kept for the choices and
+/// snapshots of later versions.
 const MONOTONIC: u8 = 1;
 const DUE: u8 = 32;
 const RECEIVED: u8 = 33;
 const CHECK: u8 = 48;
+/// Tag of an effect, the last one of those that have a question.
+const INTENDED: u8 = 64;
 
 macro_rules! define_answers {
     ($( $tag:literal $record:ident )*) => {
@@ -223,7 +242,8 @@ macro_rules! define_answers {
         /// Reads a record; `None` if there is none.
         pub(super) fn read(from: &mut ByteReader<'_>, before: &mut Before) -> Option<NotedRecord> {
             let tag = from.byte()?;
-            let question = if tag <= DUE { QuestionHash(from.small()?) } else { QuestionHash::default() };
+            let is_asked = tag <= DUE || tag == INTENDED;
+            let question = if is_asked { QuestionHash(from.small()?) } else { QuestionHash::default() };
             let record = match tag {
                 $( $tag => Record::$record(Packed::read(from)?), )*
                 MONOTONIC => Record::Monotonic(sum(from, &mut before.time)?),
@@ -260,6 +280,7 @@ define_answers! {
     15 Called
     16 BrokenOutput
     17 ProcessorTime
+    64 Intended
 }
 
 /// Writes a number as the difference from the one before.

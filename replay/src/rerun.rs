@@ -38,6 +38,9 @@ impl fmt::Display for RerunError {
 
 impl std::error::Error for RerunError {}
 
+/// Ticks after which the replay looks whether it has come to the last record.
+const STRETCH: u64 = 100_000;
+
 /// How a replay has ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Replayed {
@@ -113,16 +116,40 @@ impl Rerun {
     /// Runs on for at most `ticks`. Returns how the replay has ended, once it has.
     pub fn run(&mut self, ticks: u64) -> Option<&Replayed> {
         if self.replayed.is_none() {
-            let outcome = match &mut self.followed {
-                Some(followed) => self.machine.go_on_following(followed, ticks),
-                None => self.machine.run(ticks),
-            };
+            let outcome = self.go_on(ticks);
             if outcome != RunOutcome::TicksUsed || self.host.has_diverged() {
                 let replayed = self.end(outcome);
                 self.replayed = Some(replayed);
             }
         }
         self.replayed.as_ref()
+    }
+
+    fn go_on(&mut self, ticks: u64) -> RunOutcome {
+        match &mut self.followed {
+            Some(followed) => self.machine.go_on_following(followed, ticks),
+            None => self.machine.run(ticks),
+        }
+    }
+
+    /// Runs to the last record, and less than a second beyond it. The tasks stay as they are there if the
+    /// recording does not have the end of the run. Returns how the replay has ended.
+    pub fn run_to_last_record(&mut self) -> Replayed {
+        loop {
+            if let Some(replayed) = &self.replayed {
+                return replayed.clone();
+            }
+            let outcome = self.go_on(STRETCH);
+            let is_over = outcome != RunOutcome::TicksUsed || self.host.has_diverged();
+            let is_equal = self.host.is_at_end() && self.host.divergence().is_none();
+            if self.recorded.end.is_none() && is_equal {
+                self.replayed = Some(Replayed::Cut);
+            } else if is_over {
+                // The last record may belong to the cleanups of a run that was over.
+                let replayed = self.end(outcome);
+                self.replayed = Some(replayed);
+            }
+        }
     }
 
     /// Returns how the replay has ended, if it has.

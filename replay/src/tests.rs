@@ -16,7 +16,8 @@ use proptest::prelude::*;
 
 use super::breakpoint::Target;
 use super::debugger::Debugger;
-use super::file::{Unwritten, beginning_bytes, end_bytes};
+use super::file::{beginning_bytes, end_bytes};
+use super::journal::JournalWriter;
 use super::pack::{ByteReader, ByteWriter};
 use super::*;
 
@@ -192,10 +193,10 @@ fn records() -> Vec<NotedRecord> {
 /// Bytes of a file in which each of some records has a frame of its own.
 fn bytes_of(records: &[NotedRecord]) -> Vec<u8> {
     let mut bytes = beginning_bytes(&beginning());
-    let mut unwritten = Unwritten::default();
+    let mut unwritten = JournalWriter::default();
     for noted in records {
         unwritten.add(noted);
-        bytes.extend(unwritten.take());
+        bytes.extend(unwritten.take_unmarked());
     }
     let check = RunCheck { round: 5, ticks: 6, canary: 7 };
     bytes.extend(end_bytes(&RecordedEnd { status: 3, check }));
@@ -288,9 +289,9 @@ proptest! {
     /// So is that of a record in which a byte has changed.
     #[test]
     fn no_record_is_too_strange(which in 0_usize..34, at in any::<prop::sample::Index>(), byte: u8) {
-        let mut unwritten = Unwritten::default();
+        let mut unwritten = JournalWriter::default();
         unwritten.add(&records()[which]);
-        let mut frame = unwritten.take();
+        let mut frame = unwritten.take_unmarked();
         let content = &mut frame[11..];
         let index = at.index(content.len());
         content[index] = byte;

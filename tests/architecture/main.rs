@@ -28,10 +28,11 @@ const SECTIONS: [(&str, &str); 12] = [
 ];
 
 /// Folders of the packages that the table of tools lists as a whole.
-const TOOLS: [&str; 11] = [
+const TOOLS: [&str; 12] = [
     "commands/eslc",
     "commands/eslvm",
     "commands/shared",
+    "durable",
     "format",
     "language-server",
     "operate",

@@ -11,7 +11,7 @@ const CLEANUP_TIME: u64 = 60_000_000_000;
 const MAX_STACK: usize = 1 << 30;
 
 /// Limits and settings of a virtual machine.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Config {
     /// Limit of the heap in bytes.
     pub memory: usize,

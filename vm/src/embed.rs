@@ -6,7 +6,7 @@ use std::fmt;
 use esl_bytecode::datum::Datum;
 use esl_database::Database;
 use esl_host::machine::Canary;
-use esl_host::{Host, Inbox, Incoming, Output, ProcessSignal};
+use esl_host::{CallEffect, Host, Inbox, Incoming, Output, ProcessSignal};
 
 use crate::builtins::NATIVES;
 use crate::compiler::Compilations;
@@ -187,12 +187,23 @@ impl Vm {
 
     /// As [`Vm::add_host_function`]; a call fails unless the program has the rights that the function needs.
     pub fn add_guarded_function(&mut self, name: &str, function: HostFunction, needs: &[Need]) {
-        self.outside.functions.insert(name.into(), Given { function, needs: needs.to_vec() });
+        self.add_function_with(name, function, needs, CallEffect::default());
+    }
+
+    /// As [`Vm::add_guarded_function`], of a function with a declared effect.
+    pub fn add_function_with(
+        &mut self,
+        name: &str,
+        function: HostFunction,
+        needs: &[Need],
+        effect: CallEffect,
+    ) {
+        self.outside.functions.insert(name.into(), Given { function, needs: needs.to_vec(), effect });
     }
 
     /// Adds a function of the host that a row declares, in place of an earlier one of its name.
     pub fn add_host_row(&mut self, row: HostRow) {
-        self.add_guarded_function(row.name, row.function, &row.needs);
+        self.add_function_with(row.name, row.function, &row.needs, row.effect);
     }
 
     /// Returns the functions of the embedder's: their names,

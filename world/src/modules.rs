@@ -94,13 +94,15 @@ pub(crate) fn install(machine: &mut Vm) {
     let mut rows = HostRows::new(&inbox);
     rows.at_once("%MODULE-TEXT", ["name"], "Returns the text of a module, or NIL.", |name: String| {
         Ok(module(&name))
-    });
+    })
+    .local();
     rows.at_once(
         "%FEATURE-OF-MODULE",
         ["name"],
         "Returns the feature of the commands that adds a module that is missing, or NIL.",
         |name: String| Ok(feature_of_module(&name)),
-    );
+    )
+    .local();
     let for_definitions = inbox.clone();
     rows.at_once(
         "%HOST-FUNCTIONS",
@@ -110,8 +112,10 @@ pub(crate) fn install(machine: &mut Vm) {
             let module = find(&name);
             Ok(module.map(|module| definitions(&(module.rows)(&for_definitions))))
         },
-    );
-    rows.at_once("%TIME-NOW", [], "Returns NIL: the program's clock tells the time.", || Ok(None::<f64>));
+    )
+    .local();
+    rows.at_once("%TIME-NOW", [], "Returns NIL: the program's clock tells the time.", || Ok(None::<f64>))
+        .local();
     rows.into_iter().for_each(|row| machine.add_host_row(row));
     let everywhere = all_rows(&inbox).filter(|row| row.is_everywhere);
     everywhere.for_each(|row| machine.add_host_row(row));

@@ -26,7 +26,8 @@ pub(crate) fn clock_rows(inbox: &Inbox) -> HostRows {
         }
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
         Ok(since.map_or_else(|before| -before.duration().as_secs_f64(), |after| after.as_secs_f64()))
-    });
+    })
+    .local();
     rows
 }
 

@@ -159,7 +159,8 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         ["process"],
         "Returns whether PROCESS has not ended.",
         |program: HostHandle<ChildProcess>| Ok(program.get()?.status.borrow().is_none()),
-    );
+    )
+    .local();
     rows
 }
 

@@ -69,10 +69,15 @@ impl SignalTarget {
 /// Has signals end the compilation or the run, with its cleanups. A second Ctrl-C cuts that short, and a
 /// third one ends the process whatever the machine does.
 pub fn end_on_signal(target: SignalTarget) {
+    end_on_signal_unless(target, |_| false);
+}
+
+/// As [`end_on_signal`], but for the signals that `takes` has taken.
+pub fn end_on_signal_unless(target: SignalTarget, takes: impl Fn(ProcessSignal) -> bool + Send + 'static) {
     let interrupts = AtomicUsize::new(0);
     on_signal(true, move |signal| {
         let inbox = target.lock();
-        if !signal.ends_a_run() && !inbox.is_handled(signal) {
+        if !signal.ends_a_run() && !inbox.is_handled(signal) || !inbox.is_handled(signal) && takes(signal) {
             return;
         }
         if !inbox.is_handled(signal)

@@ -4,48 +4,24 @@
 //! than it did, or a check differs, the replay has diverged: it says where, and has the machine come back. So
 //! it does when the program asks something after the last record: a replay never goes on by itself.
 
-use std::fmt;
+mod divergence;
+
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 
 use crate::record::{
-    Arguments, BrokenOutput, Called, Due, Exists, FileRead, Filed, Interactive, Monotonic, NotedRecord,
-    PassedOn, Permitted, ProcessorTime, QuestionHash, Read, Received, Record, RecordedAnswer, Seed, Virtual,
-    Waited, WallClock, Written,
+    Arguments, BrokenOutput, Called, Due, Exists, FileRead, Filed, Intended, Intent, Interactive, Monotonic,
+    NotedRecord, PassedOn, Permitted, ProcessorTime, QuestionHash, Read, Received, Record, RecordedAnswer,
+    Seed, Virtual, Waited, WallClock, Written,
 };
 use crate::{
-    Awaited, Captured, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output,
-    Permit, ProcessSignal, Right, Rights, RunCheck, Wake, WriteMode,
+    ActionId, Awaited, Captured, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, Inbox,
+    Incoming, Input, Output, Permit, ProcessSignal, Right, Rights, RunCheck, Wake, WriteMode,
 };
 
-/// Where a replay is not the recorded run, and in what.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Divergence {
-    /// Number of the record, from 1 on.
-    pub record: usize,
-    /// The question of the program.
-    pub asked: String,
-    /// The recorded question.
-    pub recorded: String,
-    /// The last check in which both were equal.
-    pub equal: Option<RunCheck>,
-}
-
-impl fmt::Display for Divergence {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Divergence { record, asked, recorded, equal } = self;
-        write!(
-            f,
-            "the replay has diverged at record {record}: the program asks {asked}; recorded is {recorded}"
-        )?;
-        match equal {
-            Some(check) => write!(f, "; the last equal check is at tick {}", check.ticks),
-            None => write!(f, "; no equal check precedes it"),
-        }
-    }
-}
+pub use divergence::Divergence;
 
 /// The source of answers. Without records it is an empty world, whose time passes during waits.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -89,6 +65,8 @@ pub struct ReplayHost {
     captured: Captured,
     screen: Arc<Mutex<Option<OutputScreen>>>,
     inbox: Inbox,
+    /// Whether the inbox is that of another host too, which takes out its contents.
+    is_shared: bool,
 }
 
 impl ReplayHost {
@@ -109,9 +87,20 @@ impl ReplayHost {
             captured: Captured::default(),
             screen: Arc::default(),
             inbox: Inbox::new(),
+            is_shared: false,
         };
         replay.ring_if_needed(&replay.progress());
         replay
+    }
+
+    /// Makes it share the inbox of another host, which goes on with the run after the last record. The
+    /// contents of the inbox are left to that host.
+    #[must_use]
+    pub fn with_inbox(mut self, inbox: Inbox) -> ReplayHost {
+        self.inbox = inbox;
+        self.is_shared = true;
+        self.ring_if_needed(&self.progress());
+        self
     }
 
     /// Has output passed to `screen` instead of being captured.
@@ -156,6 +145,33 @@ impl ReplayHost {
     /// Returns how many records were replayed.
     pub fn replayed(&self) -> usize {
         self.progress().replayed
+    }
+
+    /// Returns how many questions whether a timer is due were answered no.
+    pub fn not_due(&self) -> u64 {
+        self.progress().not_due
+    }
+
+    /// Takes the intent of the question with this hash, if that is the next record.
+    pub fn take_intent(&self, question: QuestionHash) -> Option<Intent> {
+        let is_next = {
+            let progress = self.progress();
+            let next = progress.records.get(progress.replayed);
+            next.is_some_and(|noted| {
+                noted.question == question && matches!(noted.record, Record::Intended(_))
+            })
+        };
+        if is_next {
+            self.next::<Intended>(question, &|| "for an effect".into()).map(|intent| intent.0)
+        } else {
+            None
+        }
+    }
+
+    /// Takes the intent of a call that begins an operation. Without it the replay has diverged.
+    pub fn expect_intent(&self, call: HostCall<'_>) -> Option<Intent> {
+        let question = QuestionHash::of_call(call.name, call.arguments);
+        self.next::<Intended>(question, &|| asked_call(call)).map(|intent| intent.0)
     }
 
     /// Returns how many checks were equal, and the last of them.
@@ -321,9 +337,10 @@ impl Host for ReplayHost {
     }
 
     fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
-        let text = format!("{request:?}");
-        let asked = || format!("of files: {text}");
-        let answer = self.next::<Filed>(QuestionHash::of(&[text.as_bytes()]), &asked);
+        let question = QuestionHash::of_request(&request);
+        self.take_intent(question);
+        let asked = || format!("of files: {request:?}");
+        let answer = self.next::<Filed>(question, &asked);
         answer.map_or(Err(HostError::Refused), |answer| answer.0)
     }
 
@@ -335,24 +352,27 @@ impl Host for ReplayHost {
 
     fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
         let asked = || format!("for the contents of `{path}`");
-        let answer = self.next::<FileRead>(QuestionHash::of(&[path.as_bytes()]), &asked);
+        let answer = self.next::<FileRead>(QuestionHash::of_path(path), &asked);
         answer.map_or(Err(HostError::Refused), |answer| answer.0)
     }
 
     fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
         let asked = || format!("to write {} to `{path}`", quoted(bytes));
-        let answer = self.next::<Written>(QuestionHash::of_write_file(path, bytes, mode), &asked);
+        let question = QuestionHash::of_write_file(path, bytes, mode);
+        self.take_intent(question);
+        let answer = self.next::<Written>(question, &asked);
         answer.map_or(Err(HostError::Refused), |answer| answer.0)
     }
 
     fn file_exists(&mut self, path: &str) -> bool {
         let asked = || format!("whether there is `{path}`");
-        self.next::<Exists>(QuestionHash::of(&[path.as_bytes()]), &asked).is_some_and(|answer| answer.0)
+        self.next::<Exists>(QuestionHash::of_path(path), &asked).is_some_and(|answer| answer.0)
     }
 
     fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
         let asked = || format!("to delete `{path}`");
-        let answer = self.next::<Written>(QuestionHash::of(&[path.as_bytes()]), &asked);
+        self.take_intent(QuestionHash::of_path(path));
+        let answer = self.next::<Written>(QuestionHash::of_path(path), &asked);
         answer.map_or(Err(HostError::Refused), |answer| answer.0)
     }
 
@@ -376,31 +396,32 @@ impl Host for ReplayHost {
 
     fn call(
         &mut self,
-        name: &str,
-        arguments: &[Datum],
+        call: HostCall<'_>,
         _function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
         let is_missing = || HostFailure {
             cause: "NOT-IN-THIS-WORLD".into(),
-            arguments: vec![Datum::string(name, Span::default())],
+            arguments: vec![Datum::string(call.name, Span::default())],
         };
-        let asked = || {
-            let arguments: String = arguments.iter().map(|argument| format!(" {argument}")).collect();
-            format!("for a call of the host: ({name}{})", quoted(arguments.as_bytes()).trim_matches('"'))
-        };
-        let answer = self.next::<Called>(QuestionHash::of_call(name, arguments), &asked);
+        let question = QuestionHash::of_call(call.name, call.arguments);
+        self.take_intent(question);
+        let answer = self.next::<Called>(question, &|| asked_call(call));
         answer.map_or_else(|| Err(is_missing()), |answer| answer.0)
     }
 
     /// Nothing is begun; what was heard then is heard again.
-    fn begin(&mut self, _name: &str, _arguments: &[Datum], _function: &mut dyn FnMut(&[Datum])) {}
+    fn begin(&mut self, call: HostCall<'_>, _function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
+        self.take_intent(QuestionHash::of_call(call.name, call.arguments));
+    }
 
     fn inbox(&self) -> Inbox {
         self.inbox.clone()
     }
 
     fn poll(&mut self, round: u64) -> Vec<Incoming> {
-        self.inbox.take();
+        if !self.is_shared {
+            self.inbox.take();
+        }
         {
             let mut progress = self.progress();
             if progress.source != AnswerSource::Records {
@@ -447,6 +468,12 @@ impl Host for ReplayHost {
         let answer = self.next_plain::<BrokenOutput>("for the status of a closed output");
         answer.map_or(0, |answer| answer.0)
     }
+}
+
+/// Returns the text of a call, for a message.
+fn asked_call(call: HostCall<'_>) -> String {
+    let arguments: String = call.arguments.iter().map(|argument| format!(" {argument}")).collect();
+    format!("for a call of the host: ({}{})", call.name, quoted(arguments.as_bytes()).trim_matches('"'))
 }
 
 /// Returns the beginning of a text in quotes, for a message.

@@ -177,7 +177,8 @@ fn add_links(rows: &mut HostRows) {
     rows.at_once("%MAVLINK-CLOSE", ["link"], "Closes LINK.", |link: HostHandle<MavlinkLink>| {
         link.0.close();
         Ok(())
-    });
+    })
+    .closes();
     rows.at_once(
         "%MAVLINK-SIGN",
         ["link", "key", "number", "accepts-unsigned"],

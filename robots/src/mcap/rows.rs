@@ -51,7 +51,8 @@ fn add_files(rows: &mut HostRows) {
         file.close();
         Ok(())
     })
-    .everywhere();
+    .everywhere()
+    .closes();
     rows.at_once(
         "%MCAP-DAMAGE",
         ["file"],

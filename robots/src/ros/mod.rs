@@ -175,7 +175,8 @@ fn add_nodes(rows: &mut HostRows) {
     rows.at_once("%ROS-END", ["node"], "Ends NODE.", |node: HostHandle<RosNode>| {
         node.end();
         Ok(())
-    });
+    })
+    .closes();
     rows.at_once(
         "%ROS-COUNT",
         ["node", "kind", "name"],
@@ -225,7 +226,8 @@ fn add_topics(rows: &mut HostRows, types: &Types) {
             publisher.close();
             Ok(())
         },
-    );
+    )
+    .closes();
     let (known, mut made) = (types.clone(), 0);
     rows.operation(
         spawned,

@@ -2,8 +2,8 @@
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_host::{
-    Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, HostState, Inbox, Incoming, Input,
-    Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
+    ActionId, Awaited, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, HostState, Inbox,
+    Incoming, Input, Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
 };
 
 use super::recorder::RunRecorder;
@@ -136,18 +136,17 @@ impl<H: Host> Host for ObservedHost<H> {
 
     fn call(
         &mut self,
-        name: &str,
-        arguments: &[Datum],
+        call: HostCall<'_>,
         function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
         if let Some(topics) = &self.topics {
-            topics.note_call(name, arguments, |topic, of_type, payload| {
+            topics.note_call(call.name, call.arguments, |topic, of_type, payload| {
                 self.recorder.note_topic(topic, of_type, payload);
             });
         }
-        let answer = self.host.call(name, arguments, function);
+        let answer = self.host.call(call, function);
         if self.topics.is_some()
-            && name == "%TIME-NOW"
+            && call.name == "%TIME-NOW"
             && let Ok(answer) = &answer
             && let DatumKind::Float(seconds) = answer.kind()
         {
@@ -157,15 +156,15 @@ impl<H: Host> Host for ObservedHost<H> {
         answer
     }
 
-    fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
+    fn begin(&mut self, call: HostCall<'_>, function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
         self.note_time();
-        self.recorder.note_operation(name, arguments);
+        self.recorder.note_operation(call.name, call.arguments);
         if let Some(topics) = &mut self.topics {
-            topics.note_operation(name, arguments, |topic, of_type, payload| {
+            topics.note_operation(call.name, call.arguments, |topic, of_type, payload| {
                 self.recorder.note_topic(topic, of_type, payload);
             });
         }
-        self.host.begin(name, arguments, function);
+        self.host.begin(call, function);
     }
 
     fn inbox(&self) -> Inbox {

@@ -154,7 +154,8 @@ fn add_sessions(rows: &mut HostRows) {
         ["session"],
         "Closes SESSION, when earlier requests are handed over.",
         |session: HostHandle<ZenohSession>| async move { session.close().await },
-    );
+    )
+    .closes();
     rows.at_once(
         "%ZENOH-ID",
         ["session"],
@@ -268,7 +269,8 @@ fn add_entities(rows: &mut HostRows) {
             entity.end();
             Ok(())
         },
-    );
+    )
+    .closes();
     rows.at_once(
         "%ZENOH-LOST",
         ["entity"],

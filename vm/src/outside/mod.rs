@@ -9,7 +9,7 @@ use std::hash::{BuildHasherDefault, DefaultHasher};
 use esl_bytecode::datum::Datum;
 use esl_heap::state::{StateSink, Stated};
 use esl_host::machine::{Asked, Canceller, Console};
-use esl_host::{Host, HostFailure, HostFunction, HostOperation, Inbox, Need, Output};
+use esl_host::{CallEffect, Host, HostCall, HostFailure, HostFunction, HostOperation, Inbox, Need, Output};
 use indexmap::IndexMap;
 
 use crate::task::TaskNumber;
@@ -20,6 +20,7 @@ pub(crate) use under_way::Operations;
 pub(crate) struct Given {
     pub(crate) function: HostFunction,
     pub(crate) needs: Vec<Need>,
+    pub(crate) effect: CallEffect,
 }
 
 /// Answers of functions of the embedder's for which the heap has no room yet. The functions have effects, so
@@ -139,8 +140,9 @@ impl Outside {
     ) -> Option<Result<Datum, HostFailure>> {
         self.calls += 1;
         let (name, given) = self.functions.get_index_mut(function.0)?;
+        let call = HostCall { name, arguments, effect: given.effect, operation: None };
         match &mut given.function {
-            HostFunction::AtOnce(function) => Some(self.host.call(name, arguments, function)),
+            HostFunction::AtOnce(function) => Some(self.host.call(call, function)),
             HostFunction::Operation(_) => None,
         }
     }
@@ -170,8 +172,11 @@ impl Outside {
         let canceller = Canceller::default();
         self.operations.begin(handle, canceller.clone(), is_detached, begun_by);
         let number = self.operations.begun;
-        self.host.begin(name, arguments, &mut |arguments| {
-            function(HostOperation::new(number, arguments.to_vec(), self.inbox.clone(), canceller.clone()));
+        let call = HostCall { name, arguments, effect: given.effect, operation: Some(number) };
+        self.host.begin(call, &mut |arguments, action| {
+            let arguments = arguments.to_vec();
+            let operation = HostOperation::new(number, arguments, self.inbox.clone(), canceller.clone());
+            function(operation.with_action(action));
         });
     }
 

@@ -156,6 +156,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
             answer(size.map(|size| i64::try_from(size).unwrap_or(i64::MAX)))
         },
     )
+    .idempotent()
     .needs(Right::Read, "path");
     rows
 }
@@ -164,9 +165,13 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
 fn add_requests(rows: &mut HostRows) {
     let probe = |path: String| async move { answer(in_thread(move || Ok(Path::new(&path).is_file())).await) };
     let is_file = "Returns whether there is a file PATH.";
-    rows.operation(spawned, "%FILE-PROBE", ["path"], is_file, probe).needs(Right::Read, "path");
-    rows.operation(spawned, "%FILE-PROBE-OUTPUT", ["path"], is_file, probe).needs(Right::Write, "path");
-    rows.operation(spawned, "%MODULE-PROBE", ["path"], is_file, probe).needs(Right::Module, "path");
+    rows.operation(spawned, "%FILE-PROBE", ["path"], is_file, probe).idempotent().needs(Right::Read, "path");
+    rows.operation(spawned, "%FILE-PROBE-OUTPUT", ["path"], is_file, probe)
+        .idempotent()
+        .needs(Right::Write, "path");
+    rows.operation(spawned, "%MODULE-PROBE", ["path"], is_file, probe)
+        .idempotent()
+        .needs(Right::Module, "path");
     rows.operation(spawned, "%FILE-DELETE", ["path"], "Deletes the file PATH.", |path: String| async move {
         answer(in_thread(move || std::fs::remove_file(path)).await.map(|()| true))
     })
@@ -178,6 +183,7 @@ fn add_requests(rows: &mut HostRows) {
         "Returns the names of the entries of the folder PATH.",
         |path: String| async move { requested(move || request_of_files(FileRequest::List(&path))).await },
     )
+    .idempotent()
     .needs(Right::Read, "path");
     rows.operation(
         spawned,
@@ -194,6 +200,7 @@ fn add_requests(rows: &mut HostRows) {
             })
         },
     )
+    .idempotent()
     .needs(Right::Read, "path");
     rows.operation(
         spawned,
@@ -202,6 +209,7 @@ fn add_requests(rows: &mut HostRows) {
         "Returns the time at which the file PATH was changed.",
         |path: String| async move { requested(move || request_of_files(FileRequest::Date(&path))).await },
     )
+    .idempotent()
     .needs(Right::Read, "path");
     rows.operation(
         spawned,
@@ -245,7 +253,8 @@ fn add_immediate(rows: &mut HostRows) {
         ["file", "as-text"],
         "Takes the buffered input, a text or bytes; NIL at the end.",
         |file: HostHandle<FileSlot>, as_text: bool| Ok(file.get()?.take(as_text)),
-    );
+    )
+    .local();
     rows.at_once(
         "%FILE-POSITION",
         ["file"],
@@ -253,11 +262,13 @@ fn add_immediate(rows: &mut HostRows) {
         |file: HostHandle<FileSlot>| {
             Ok(file.get()?.position().map(|position| i64::try_from(position).unwrap_or(i64::MAX)))
         },
-    );
+    )
+    .local();
     rows.at_once("%FILE-CLOSE", ["file"], "Closes FILE.", |file: HostHandle<FileSlot>| {
         file.close();
         Ok(())
-    });
+    })
+    .closes();
 }
 
 /// Returns options that open a file without waiting, such as for the other end of a FIFO.

@@ -13,7 +13,9 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use bytes::Bytes;
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_host::{FromArgument, HostFailure, HostHandle, HostObject, HostRows, Payload, Right};
+use esl_host::{
+    ActionId, CallAction, FromArgument, HostFailure, HostHandle, HostObject, HostRows, Payload, Right,
+};
 use http_body_util::channel::{Channel, Sender};
 use http_body_util::{BodyExt, Either, Full};
 use hyper::body::{Frame, Incoming};
@@ -121,13 +123,15 @@ pub(super) fn add(rows: &mut HostRows) {
     rows.at_once("%HTTP-CLOSE-REQUEST", ["request"], "Ends REQUEST.", |request: HostHandle<RequestSlot>| {
         drop(request.0.close());
         Ok(())
-    });
+    })
+    .closes();
     rows.operation(
         spawned,
         "%HTTP-SEND",
         ["request", "address", "method", "url", "headers", "body", "ca-file", "certificate", "key"],
         "Connects to ADDRESS and begins REQUEST. BODY is a text or bytes, NIL, or T if it comes in parts.",
-        |slot: HostHandle<RequestSlot>,
+        |CallAction(action): CallAction,
+         slot: HostHandle<RequestSlot>,
          address: String,
          method: String,
          url: String,
@@ -136,7 +140,8 @@ pub(super) fn add(rows: &mut HostRows) {
          files: ClientFiles| async move {
             let url = target::parse(&url, None)?;
             let (body, parts) = body_of(body);
-            let given = headers_of(headers)?;
+            let mut given = headers_of(headers)?;
+            name_action(&mut given, &method, action);
             let takes_any_coding = given.contains_key(header::ACCEPT_ENCODING);
             let request = request(&method, &url, given, body)?;
             let (answer, driver) = send(&address, &url, files, request).await?;
@@ -172,6 +177,19 @@ pub(super) fn add(rows: &mut HostRows) {
         "Waits for a piece of the body of the answer, a text or bytes; NIL at its end.",
         |request: HostHandle<RequestSlot>, as_bytes: bool| async move { read(request.get()?, as_bytes).await },
     );
+}
+
+/// Has a request that may not be made twice carry the identity of its call, by which a server tells a second
+/// one from the first.
+fn name_action(headers: &mut HeaderMap, method: &str, action: Option<ActionId>) {
+    let name = header::HeaderName::from_static("idempotency-key");
+    if matches!(method, "POST" | "PATCH")
+        && !headers.contains_key(&name)
+        && let Some(action) = action
+        && let Ok(value) = HeaderValue::from_str(&format!("\"{action}\""))
+    {
+        headers.insert(name, value);
+    }
 }
 
 /// Sends a request over a connection of its own.

@@ -155,7 +155,8 @@ pub(super) fn add(rows: &mut HostRows) {
             }
             Ok(())
         },
-    );
+    )
+    .closes();
     rows.operation(
         spawned,
         "%HTTP-CLOSE-SERVER",
@@ -171,7 +172,8 @@ pub(super) fn add(rows: &mut HostRows) {
             }
             Ok(())
         },
-    );
+    )
+    .closes();
 }
 
 /// Has a server listen. Returns the port.

@@ -211,7 +211,8 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         ["client"],
         "Returns the reason why there is no connection, or NIL.",
         |client: HostHandle<Client>| Ok(client.get()?.shared.state().problem.clone()),
-    );
+    )
+    .local();
     rows.operation(
         spawned,
         "%MQTT-CLOSE",
@@ -226,7 +227,8 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
             }
             Ok(())
         },
-    );
+    )
+    .closes();
     rows
 }
 

@@ -199,7 +199,8 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     )
     .needs(Right::Net, "address");
     rows.operation(ready_soon, "%UDP-AWAIT", ["socket"], "Waits for a datagram.", datagram::wait);
-    rows.at_once("%UDP-TAKE", ["socket"], "Takes a datagram: its bytes and its sender.", datagram::take);
+    rows.at_once("%UDP-TAKE", ["socket"], "Takes a datagram: its bytes and its sender.", datagram::take)
+        .local();
     rows
 }
 
@@ -214,7 +215,8 @@ fn add_connections(rows: &mut HostRows) {
     rows.at_once("%SOCKET-NEW", [], "Returns a socket that is not connected.", move || {
         let number = lock(&next)();
         Ok(HostHandle::new(number, Socket::new((SocketKind::New, 0, String::new()))))
-    });
+    })
+    .local();
     rows.at_once("%SOCKET-ACCEPTED", ["listener"], "Takes a connection, or NIL.", {
         move |listener: HostHandle<Socket>| match listener.kind()? {
             SocketKind::Listener(_, accepted) => {
@@ -223,17 +225,21 @@ fn add_connections(rows: &mut HostRows) {
             }
             _ => Err(SocketFault::NotListening.into()),
         }
-    });
+    })
+    .local();
     rows.at_once("%SOCKET-CLOSE", ["socket"], "Closes SOCKET.", |socket: HostHandle<Socket>| {
         socket.close();
         Ok(())
-    });
+    })
+    .closes();
     rows.at_once("%SOCKET-PORT", ["socket"], "Returns the port here.", |socket: HostHandle<Socket>| {
         Ok(socket.check()?.1)
-    });
+    })
+    .local();
     rows.at_once("%SOCKET-PEER", ["socket"], "Returns the address there.", |socket: HostHandle<Socket>| {
         Ok(socket.check()?.2.clone())
-    });
+    })
+    .local();
     rows.operation(
         ready_soon,
         "%SOCKET-CONNECT",
@@ -259,7 +265,8 @@ fn add_connections(rows: &mut HostRows) {
         ["socket"],
         "Takes whole lines, or characters, so that bytes may follow; NIL at the end.",
         |socket: HostHandle<Socket>| Ok(socket.connection()?.take(Arrived::take_lines)),
-    );
+    )
+    .local();
     rows.at_once(
         "%SOCKET-TAKE-BYTES",
         ["socket", "limit"],
@@ -267,7 +274,8 @@ fn add_connections(rows: &mut HostRows) {
         |socket: HostHandle<Socket>, limit: usize| {
             Ok(socket.connection()?.take(|arrived| arrived.take_bytes(limit)))
         },
-    );
+    )
+    .local();
     rows.at_once(
         "%SOCKET-SEND",
         ["socket", "contents"],

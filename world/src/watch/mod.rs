@@ -122,7 +122,8 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     rows.at_once("%WATCH-CLOSE", ["watch"], "Ends WATCH.", |watch: HostHandle<WatchSlot>| {
         watch.set(None);
         Ok(())
-    });
+    })
+    .closes();
     rows.operation(
         spawned,
         "%WATCH-OPEN",

@@ -158,7 +158,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         "Returns the next message that has arrived; NIL if there is none yet. At the end of the connection it fails; if \
          it is LENIENT and the end is an ordinary one, it returns T.",
         |connection: HostHandle<WsConnection>, is_lenient: bool| connection.get()?.take(is_lenient),
-    );
+    ).local();
     rows.operation(
         ready_soon,
         "%WS-AWAIT",
@@ -186,7 +186,8 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
             connection.close(frame).await;
             Ok(())
         },
-    );
+    )
+    .closes();
     rows
 }
 

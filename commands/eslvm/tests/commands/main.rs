@@ -16,6 +16,8 @@ mod copter;
 mod coverage;
 mod deadlock;
 mod documents;
+#[cfg(unix)]
+mod durable;
 mod endings;
 mod examples;
 mod exploring;

@@ -20,6 +20,7 @@ mod chapters {
         c = "c.md",
         coordination = "coordination.md",
         database = "database.md",
+        durable = "durable.md",
         embedding = "embedding.md",
         failure = "failure.md",
         goals = "goals.md",

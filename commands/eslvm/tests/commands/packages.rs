@@ -123,6 +123,7 @@ fn an_archive_has_the_commands_and_the_libraries() {
         "include/esl.hpp",
         "lib/libesl.so",
         "lib/systemd/system/eslvm@.service",
+        "lib/systemd/system/eslvm-durable@.service",
         "share/bash-completion/completions/eslvm",
         "share/doc/esl/LICENSE-MIT",
         "share/doc/esl/LICENSES-of-dependencies",

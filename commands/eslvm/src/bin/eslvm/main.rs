@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stderr, reason = "commands print")]
 
+mod durable;
 mod explore;
 mod figures;
 mod options;
@@ -19,6 +20,7 @@ use esl_command as command;
 use eslvm::repl::AttachSecurity;
 use eslvm::{explore::read_schedule, replay, testing};
 
+use durable::{run_durable, run_state};
 use explore::run_explore;
 use options::{ClockChoice, CompilingOptions, Eslvm, EslvmAction};
 use run::{RunReports, run};
@@ -73,6 +75,7 @@ fn main() -> ExitCode {
             full,
             files,
             operate,
+            durable,
             file,
             arguments,
         } => {
@@ -90,7 +93,8 @@ fn main() -> ExitCode {
             let path = ModulePath::new([file.as_path()], &modules.library);
             let rights = options.rights.rights();
             rights.and_then(|rights| {
-                let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
+                let host =
+                    RealHost::new(arguments.clone()).with_rights(path.with_rights(rights)).with_speed(speed);
                 let schedule = schedule.as_deref().map(read_schedule).transpose()?;
                 let reports = RunReports {
                     stats,
@@ -105,10 +109,17 @@ fn main() -> ExitCode {
                     operate: &operate,
                     is_quiet,
                 };
-                run(&file, host, &options, &reports, schedule.as_ref(), &path)
+                match &durable.state {
+                    Some(folder) => {
+                        let state = (folder.as_path(), &durable);
+                        run_durable(&file, &arguments, host, &options, state, &reports, &path)
+                    }
+                    None => run(&file, host, &options, &reports, schedule.as_ref(), &path),
+                }
             })
         }
         EslvmAction::Replay { options } => replay::run(&options),
+        EslvmAction::State { options } => run_state(&options),
         EslvmAction::Test {
             filter,
             watch,

@@ -14,6 +14,8 @@ use eslvm::profile::ProfileUnit;
 use eslvm::replay::ReplayOptions;
 use eslvm::rights::RightsOptions;
 
+use crate::durable::{LookOptions, StateOptions};
+
 /// The answer to `--version`.
 static BUILD: LazyLock<String> = LazyLock::new(|| {
     let features = [("native", cfg!(feature = "native")), ("robots", cfg!(feature = "robots"))];
@@ -105,6 +107,8 @@ pub(crate) enum EslvmAction {
         files: RunFileOptions,
         #[command(flatten)]
         operate: OperateOptions,
+        #[command(flatten)]
+        durable: StateOptions,
         /// Source or bytecode file; `-` is a source from standard input
         file: PathBuf,
         /// Arguments of the program
@@ -121,6 +125,15 @@ pub(crate) enum EslvmAction {
     Replay {
         #[command(flatten)]
         options: ReplayOptions,
+    },
+    /// Show a durable run as it stands
+    ///
+    /// Runs the program again by the journal in the folder, without the outside, and so verifies the journal.
+    /// Exit status: 0 the journal leads to where the run was; 2 wrong usage, or a folder that cannot be read,
+    /// or that another process has; 3 the journal is damaged; 6 it leads elsewhere, or is of another version.
+    State {
+        #[command(flatten)]
+        options: LookOptions,
     },
     /// Run the tests of programs
     ///

@@ -1,0 +1,134 @@
+//! The control of a durable run by its embedder: pauses, and news of restarts.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use esl_host::{Inbox, ReplayHost};
+use esl_replay::JournalLife;
+
+/// A run that goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resumed {
+    /// The process.
+    pub life: JournalLife,
+    /// Seconds between the last record and this process.
+    pub downtime: f64,
+    /// Number of calls that fail because the end of their process has interrupted them.
+    pub interrupted: usize,
+    /// Number of connections and servers that signalled inputs and are gone.
+    pub lost: usize,
+}
+
+/// Is called when a run goes on.
+type ResumeListener = Box<dyn FnOnce(&Resumed) + Send>;
+
+#[derive(Default)]
+struct ControlNotes {
+    inbox: Option<Inbox>,
+    /// The host by which the run is done again.
+    past: Option<ReplayHost>,
+    resumed: Option<Resumed>,
+    listener: Option<ResumeListener>,
+    /// The program's clock at the pause.
+    paused_at: Option<u64>,
+}
+
+#[derive(Default)]
+struct ControlState {
+    /// Whether a pause was requested.
+    pauses: AtomicBool,
+    /// Whether it is over, so that it cannot be paused.
+    is_ending: AtomicBool,
+    told: Mutex<ControlNotes>,
+}
+
+/// Pauses a durable run, from any thread.
+#[derive(Clone, Default)]
+pub struct DurableControl(Arc<ControlState>);
+
+impl DurableControl {
+    fn told(&self) -> MutexGuard<'_, ControlNotes> {
+        // Each field is set whole, so a panic elsewhere corrupts none.
+        self.0.told.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes the machine come back, so that the run goes on in another process. Returns false if the run is
+    /// about to end.
+    pub fn pause(&self) -> bool {
+        if self.0.is_ending.load(Ordering::Relaxed) {
+            return false;
+        }
+        self.0.pauses.store(true, Ordering::Relaxed);
+        if let Some(inbox) = &self.told().inbox {
+            inbox.ring();
+        }
+        true
+    }
+
+    /// Notes that the run is over but for its cleanups. Returns whether a pause was requested before.
+    pub fn begin_end(&self) -> bool {
+        self.0.is_ending.store(true, Ordering::Relaxed);
+        self.is_pausing()
+    }
+
+    /// Returns whether the run was asked to pause.
+    pub fn is_pausing(&self) -> bool {
+        self.0.pauses.load(Ordering::Relaxed)
+    }
+
+    /// Returns whether the machine is to come back now.
+    pub(crate) fn takes_pause(&self) -> bool {
+        self.is_pausing() && !self.0.is_ending.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn set_inbox(&self, inbox: Inbox) {
+        if self.is_pausing() {
+            inbox.ring();
+        }
+        self.told().inbox = Some(inbox);
+    }
+
+    pub(crate) fn set_past(&self, past: ReplayHost) {
+        self.told().past = Some(past);
+    }
+
+    /// Returns the place at which the run has left the course of its journal.
+    pub(crate) fn divergence(&self) -> Option<String> {
+        let told = self.told();
+        told.past.as_ref().and_then(ReplayHost::divergence).map(|divergence| divergence.to_string())
+    }
+
+    /// Returns whether the run has come to the end of the journal.
+    pub(crate) fn is_at_end_of_past(&self) -> bool {
+        self.told().past.as_ref().is_none_or(ReplayHost::is_at_end)
+    }
+
+    /// Sets a function that is called when the run goes on with the outside. The machine waits for it.
+    pub fn on_resume(&self, listener: impl FnOnce(&Resumed) + Send + 'static) {
+        self.told().listener = Some(Box::new(listener));
+    }
+
+    pub(crate) fn note_resumed(&self, resumed: Resumed) {
+        let listener = {
+            let mut told = self.told();
+            told.resumed = Some(resumed);
+            told.listener.take()
+        };
+        if let Some(listener) = listener {
+            listener(&resumed);
+        }
+    }
+
+    pub(crate) fn note_time(&self, time: u64) {
+        self.told().paused_at = Some(time);
+    }
+
+    pub(crate) fn paused_at(&self) -> Option<u64> {
+        self.told().paused_at
+    }
+
+    /// Returns the restart, once the run has gone on.
+    pub fn resumed(&self) -> Option<Resumed> {
+        self.told().resumed
+    }
+}

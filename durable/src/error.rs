@@ -1,0 +1,89 @@
+//! Reasons why a durable run cannot begin, or cannot go on.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+
+use esl_bytecode::file::WriteError;
+use esl_replay::RecordedError;
+
+/// Reason why a durable run cannot begin, or cannot go on.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum DurableError {
+    /// The folder, or a file in it, cannot be made, read or locked.
+    Folder(PathBuf, io::Error),
+    /// Another process has the folder.
+    InUse(PathBuf),
+    /// The folder or a file in it belongs to another user, or other users may write or read it.
+    NotPrivate(PathBuf),
+    /// There is no durable run in the folder.
+    NoRun(PathBuf),
+    /// The journal was changed, or another machine has written it.
+    Journal(RecordedError),
+    /// The program contains an object that no file can hold.
+    Program(WriteError),
+    /// The folder has the run of another program: the changes, in words.
+    OtherProgram(String),
+    /// It was begun with other settings: their names.
+    OtherSettings(&'static str),
+    /// The run does not take the course of its journal.
+    Diverged(String),
+    /// The journal cannot be written, so no effect may leave.
+    NotWritten(io::Error),
+    /// The system has refused memory, which may have changed the course of the run.
+    MemoryRefused,
+}
+
+impl fmt::Display for DurableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DurableError::Folder(path, error) => write!(f, "{} cannot be used: {error}", path.display()),
+            DurableError::InUse(path) => {
+                write!(f, "{} is in use by another process: a run has one at a time", path.display())
+            }
+            DurableError::NotPrivate(path) => write!(
+                f,
+                "{} must belong to you, without access for others, since its contents are executed; type \
+                 `chown -R $USER {}` and `chmod -R go= {}`",
+                path.display(),
+                path.display(),
+                path.display()
+            ),
+            DurableError::NoRun(path) => {
+                write!(f, "there is no durable run in {}; `eslvm run --state` begins one", path.display())
+            }
+            DurableError::Journal(RecordedError::OtherMachine) => f.write_str(
+                "the run was begun by another version of the machine or its library; go on with that version, or \
+                 begin a new run in another folder",
+            ),
+            DurableError::Journal(RecordedError::Format(version)) => {
+                write!(f, "the journal has version {version} of the format, which this machine cannot read")
+            }
+            DurableError::Journal(error) => write!(f, "the journal cannot be read: {error}"),
+            DurableError::Program(error) => write!(f, "the program cannot be durable: {error}"),
+            DurableError::OtherProgram(changes) => write!(
+                f,
+                "the folder has the run of another program: {changes}; go on with the earlier program, or begin \
+                 a new run in another folder"
+            ),
+            DurableError::OtherSettings(which) => {
+                write!(f, "the run was begun with {which}; repeat the command by which it was begun")
+            }
+            DurableError::Diverged(text) => {
+                write!(f, "the run does not take the course of its journal: {text}")
+            }
+            DurableError::NotWritten(error) => write!(
+                f,
+                "the journal cannot be written: {error}; the run stops before its next effect, and the same \
+                 command goes on"
+            ),
+            DurableError::MemoryRefused => f.write_str(
+                "the system has refused memory, which may change the course of the run; the run stops, and the \
+                 same command goes on",
+            ),
+        }
+    }
+}
+
+impl std::error::Error for DurableError {}

@@ -1,0 +1,496 @@
+//! The host of a durable run: the journal first, then the outside.
+//!
+//! It has two hosts. While there are records, a [`ReplayHost`] answers by them, and nothing leaves. From the
+//! first question on that no record answers, a [`RecordingHost`] asks the outside, and notes each answer.
+//! Between the two, the program's input `*resumed*` is signalled, and interrupted calls fail.
+//!
+//! Guarantees: before an effect leaves, all answers that the program has had are in the journal, and so is
+//! the intent of the effect. A call that may not be made twice is made once, or fails with
+//! `:interrupted-by-restart`.
+
+use std::collections::{BTreeMap, HashSet};
+
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+use esl_host::{
+    ActionId, Awaited, CallEffect, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, Inbox,
+    Incoming, Input, Intent, News, NotedRecord, Output, Permit, ProcessSignal, QuestionHash, Record,
+    Recorder, RecordingHost, ReplayHost, Right, Rights, RunCheck, Wake, WriteMode, has_gone_object,
+};
+
+use super::control::{DurableControl, Resumed};
+use super::file_effect::{FileSize, complete_deletion, complete_request, complete_write, size_of};
+use super::log::JournalLog;
+use super::resume::Resumption;
+
+/// The host of a durable run.
+pub struct DurableHost<H> {
+    past: ReplayHost,
+    live: RecordingHost<H, JournalLog>,
+    log: JournalLog,
+    control: DurableControl,
+    inbox: Inbox,
+    /// The process that is about to begin, until it has begun.
+    resumption: Option<Resumption>,
+    /// News for the machine when the run goes on: of the restart, and arrivals during the replay.
+    early: Vec<Incoming>,
+    /// Operations that have ended by the journal.
+    ended: HashSet<u64>,
+    /// Operations that have not, by number, with the news of each one that is not begun again.
+    open: BTreeMap<u64, Option<News>>,
+    /// Whether the last record is the intent of a call that fails.
+    interrupts: bool,
+    /// Number of senders that are gone.
+    lost: usize,
+}
+
+/// Returns the failure of a call that the end of its process has interrupted.
+fn interrupted(call: HostCall<'_>, action: Option<ActionId>) -> HostFailure {
+    let name = Datum::symbol(Symbol::keyword(call.name), Span::default());
+    let arguments = Datum::list(call.arguments.iter().cloned(), Span::default());
+    let action = match action {
+        Some(action) => Datum::string(&action.to_string(), Span::default()),
+        None => Datum::nil(Span::default()),
+    };
+    HostFailure { cause: "INTERRUPTED-BY-RESTART".into(), arguments: vec![name, arguments, action] }
+}
+
+/// Returns the error of an effect that does not leave, since the journal cannot be written.
+fn refused() -> HostError {
+    HostError::Other("the journal cannot be written".into())
+}
+
+/// Returns the failure of such a call.
+fn refused_call() -> HostFailure {
+    HostFailure { cause: "JOURNAL-NOT-WRITTEN".into(), arguments: Vec::new() }
+}
+
+/// Returns the numbers of the operations that have ended by these records.
+fn ended_operations(records: &[NotedRecord]) -> HashSet<u64> {
+    let arrivals = records.iter().flat_map(|noted| match &noted.record {
+        Record::Received((_, contents)) => contents.as_slice(),
+        _ => &[],
+    });
+    let ended = arrivals.filter_map(|incoming| match incoming {
+        Incoming::Operation { news: News::Progress(_), .. } => None,
+        Incoming::Operation { number, .. } => Some(*number),
+        _ => None,
+    });
+    ended.collect()
+}
+
+/// Returns how many senders of the inbox there are after these records.
+fn senders(records: &[NotedRecord]) -> usize {
+    let arrivals = records.iter().filter_map(|noted| match &noted.record {
+        Record::Received((_, contents)) => Some(contents),
+        _ => None,
+    });
+    arrivals.flatten().fold(0, |count: usize, incoming| match incoming {
+        Incoming::SenderCame => count + 1,
+        Incoming::SenderLeft => count.saturating_sub(1),
+        _ => count,
+    })
+}
+
+impl<H: Host> DurableHost<H> {
+    /// Creates the host of a run that goes on after `records`, or begins if there is no `resumption`.
+    pub(crate) fn new(
+        host: H,
+        log: JournalLog,
+        control: DurableControl,
+        records: std::sync::Arc<[NotedRecord]>,
+        resumption: Option<Resumption>,
+    ) -> DurableHost<H> {
+        let inbox = host.inbox();
+        control.set_inbox(inbox.clone());
+        let ended = ended_operations(&records);
+        let lost = senders(&records);
+        let early = (0..lost).map(|_| Incoming::SenderLeft).collect();
+        let past = ReplayHost::new(records).with_screen(|_, _| ()).with_inbox(inbox.clone());
+        control.set_past(past.clone());
+        let live = RecordingHost::with_recorder(host, log.clone());
+        DurableHost {
+            past,
+            live,
+            log,
+            control,
+            inbox,
+            resumption,
+            early,
+            ended,
+            open: BTreeMap::new(),
+            interrupts: false,
+            lost,
+        }
+    }
+
+    /// Returns whether no record answers the next question. The replay of a run that has diverged never ends.
+    fn is_live(&self) -> bool {
+        self.resumption.is_none() || (self.past.is_at_end() && !self.past.has_diverged())
+    }
+
+    /// Goes on with the outside, if no record answers the next question. Returns whether none does.
+    fn enter(&mut self) -> bool {
+        if !self.is_live() {
+            return false;
+        }
+        let Some(resumption) = self.resumption.take() else { return true };
+        self.live.go_on(self.past.not_due());
+        let (life, downtime) = resumption.begin(self.live.host_mut().monotonic());
+        self.log.note_life(life);
+        let mut first = vec![Incoming::Message {
+            input: "*RESUMED*".into(),
+            arguments: vec![
+                Datum::new(DatumKind::Float(downtime), Span::default()),
+                Datum::integer(i64::try_from(life.number).unwrap_or(i64::MAX), Span::default()),
+            ],
+        }];
+        let mut interrupted = usize::from(self.interrupts);
+        for (number, news) in std::mem::take(&mut self.open) {
+            if let Some(news) = news {
+                interrupted += 1;
+                first.push(Incoming::Operation { number, news });
+            }
+        }
+        self.control.note_resumed(Resumed { life, downtime, interrupted, lost: self.lost });
+        first.append(&mut self.early);
+        self.early = first;
+        self.inbox.ring();
+        true
+    }
+
+    /// As [`DurableHost::enter`], where the last record is the intent of a call that is not made again.
+    fn interrupts(&mut self) -> bool {
+        self.interrupts = self.is_live();
+        self.enter()
+    }
+
+    /// Rings the inbox once the records are at their end, since the news of the restart come through it.
+    fn ring_at_end(&self) {
+        if self.past.is_at_end() {
+            self.inbox.ring();
+        }
+    }
+
+    /// Notes that an effect is about to leave, and makes all safe before it. Returns its identity; `None` if
+    /// it may not leave.
+    fn intend(&mut self, question: QuestionHash, operation: Option<u64>, before: u64) -> Option<ActionId> {
+        let action = self.log.next_action();
+        self.live.note_intent(question, Intent { action, operation, before });
+        self.log.commit().then_some(action)
+    }
+
+    /// Makes a call of a function that returns at once.
+    fn call_outside(
+        &mut self,
+        call: HostCall<'_>,
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
+        if has_gone_object(call.arguments) {
+            let answer = match call.effect {
+                CallEffect::Closes => Ok(Datum::nil(Span::default())),
+                _ => Err(interrupted(call, None)),
+            };
+            return self.live.answer_call(call, answer);
+        }
+        match call.effect {
+            CallEffect::Local => return self.live.call(call, function),
+            // The close is an effect on the other end.
+            CallEffect::Closes if !self.log.commit() => return Err(refused_call()),
+            CallEffect::Closes => return self.live.call(call, function),
+            CallEffect::Idempotent | CallEffect::Once => {}
+        }
+        let question = QuestionHash::of_call(call.name, call.arguments);
+        if self.intend(question, None, 0).is_none() {
+            return Err(refused_call());
+        }
+        let answer = self.live.call(call, function);
+        self.log.write();
+        answer
+    }
+
+    /// Begins an operation.
+    fn begin_outside(&mut self, call: HostCall<'_>, function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
+        let number = call.operation.unwrap_or(0);
+        let question = QuestionHash::of_call(call.name, call.arguments);
+        let Some(action) = self.intend(question, call.operation, 0) else {
+            return self.inbox.put(Incoming::Operation { number, news: News::Failed(refused_call()) });
+        };
+        if has_gone_object(call.arguments) {
+            return self.inbox.put(Incoming::Operation { number, news: after_restart(call, None) });
+        }
+        self.live.begin(call, &mut |arguments, _| function(arguments, Some(action)));
+    }
+
+    /// Changes a file by the outside.
+    fn change_file(
+        &mut self,
+        question: QuestionHash,
+        before: FileSize,
+        change: impl FnOnce(&mut RecordingHost<H, JournalLog>) -> Result<(), HostError>,
+    ) -> Result<(), HostError> {
+        if self.intend(question, None, before.0).is_none() {
+            return Err(refused());
+        }
+        let answer = change(&mut self.live);
+        self.log.write();
+        answer
+    }
+}
+
+/// Returns the news of a call that was interrupted, or that has an object of an earlier process.
+fn after_restart(call: HostCall<'_>, action: Option<ActionId>) -> News {
+    match call.effect {
+        CallEffect::Closes => News::Completed(vec![Datum::nil(Span::default())]),
+        _ => News::Failed(interrupted(call, action)),
+    }
+}
+
+/// Asks the host whose turn it is.
+macro_rules! ask {
+    ($self:ident, $host:ident => $question:expr) => {
+        if $self.enter() {
+            let $host = &mut $self.live;
+            $question
+        } else {
+            let $host = &mut $self.past;
+            let answer = $question;
+            $self.ring_at_end();
+            answer
+        }
+    };
+}
+
+impl<H: Host> Host for DurableHost<H> {
+    fn monotonic(&mut self) -> u64 {
+        ask!(self, host => host.monotonic())
+    }
+
+    fn wall_clock(&mut self) -> i64 {
+        ask!(self, host => host.wall_clock())
+    }
+
+    fn processor_time(&mut self) -> u64 {
+        ask!(self, host => host.processor_time())
+    }
+
+    fn due(&mut self, deadline: u64) -> Option<u64> {
+        if self.enter() && !self.early.is_empty() {
+            // The news of the restart come first.
+            self.live.answer_not_due();
+            return None;
+        }
+        ask!(self, host => host.due(deadline))
+    }
+
+    fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        ask!(self, host => host.wait(deadline, awaited))
+    }
+
+    fn stopwatch(&mut self) -> u64 {
+        self.live.stopwatch()
+    }
+
+    fn is_virtual(&self) -> bool {
+        let answer = if self.is_live() { self.live.is_virtual() } else { self.past.is_virtual() };
+        if !self.is_live() {
+            self.ring_at_end();
+        }
+        answer
+    }
+
+    fn advance(&mut self, nanoseconds: u64) {
+        if self.enter() {
+            self.live.advance(nanoseconds);
+        }
+    }
+
+    fn seed(&mut self) -> u64 {
+        ask!(self, host => host.seed())
+    }
+
+    fn arguments(&mut self) -> Vec<String> {
+        ask!(self, host => host.arguments())
+    }
+
+    fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
+        if !self.enter() {
+            return ask!(self, host => host.write(output, bytes));
+        }
+        if !self.log.commit_for_output() {
+            return Err(refused());
+        }
+        let answer = self.live.write(output, bytes);
+        self.log.write();
+        answer
+    }
+
+    fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
+        if !self.enter() {
+            return ask!(self, host => host.write_ready(output, bytes));
+        }
+        if !self.log.commit_for_output() {
+            return Err(refused());
+        }
+        let answer = self.live.write_ready(output, bytes);
+        self.log.write();
+        answer
+    }
+
+    fn read_input(&mut self) -> Input {
+        ask!(self, host => host.read_input())
+    }
+
+    fn is_interactive(&mut self) -> bool {
+        ask!(self, host => host.is_interactive())
+    }
+
+    fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
+        let (FileRequest::Rename(..) | FileRequest::MakeFolders(_)) = request else {
+            return ask!(self, host => host.request_of_files(request));
+        };
+        let question = QuestionHash::of_request(&request);
+        if !self.enter() {
+            let intent = self.past.take_intent(question);
+            if intent.is_none() || !self.enter() {
+                return ask!(self, host => host.request_of_files(request));
+            }
+            let answer = complete_request(self.live.host_mut(), request);
+            return self.live.answer_request(question, answer);
+        }
+        if self.intend(question, None, 0).is_none() {
+            return Err(refused());
+        }
+        let answer = self.live.request_of_files(request);
+        self.log.write();
+        answer
+    }
+
+    fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {
+        ask!(self, host => host.permit(right, object, narrowed))
+    }
+
+    fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
+        ask!(self, host => host.read_file(path))
+    }
+
+    fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
+        let question = QuestionHash::of_write_file(path, bytes, mode);
+        if !self.enter() {
+            match self.past.take_intent(question) {
+                Some(intent) if self.enter() => {
+                    let before = FileSize(intent.before);
+                    let answer = complete_write(self.live.host_mut(), path, bytes, mode, before);
+                    return self.live.answer_write(question, answer);
+                }
+                _ => return ask!(self, host => host.write_file(path, bytes, mode)),
+            }
+        }
+        let before = size_of(path);
+        self.change_file(question, before, |live| live.write_file(path, bytes, mode))
+    }
+
+    fn file_exists(&mut self, path: &str) -> bool {
+        ask!(self, host => host.file_exists(path))
+    }
+
+    fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
+        let question = QuestionHash::of_path(path);
+        if !self.enter() {
+            match self.past.take_intent(question) {
+                Some(intent) if self.enter() => {
+                    let before = FileSize(intent.before);
+                    let answer = complete_deletion(self.live.host_mut(), path, before);
+                    return self.live.answer_write(question, answer);
+                }
+                _ => return ask!(self, host => host.delete_file(path)),
+            }
+        }
+        let before = size_of(path);
+        self.change_file(question, before, |live| live.delete_file(path))
+    }
+
+    fn call(
+        &mut self,
+        call: HostCall<'_>,
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
+        if self.enter() {
+            return self.call_outside(call, function);
+        }
+        let question = QuestionHash::of_call(call.name, call.arguments);
+        match self.past.take_intent(question) {
+            Some(_) if call.effect.may_be_repeated() && self.enter() => self.call_outside(call, function),
+            Some(intent) if self.interrupts() => {
+                self.live.answer_call(call, Err(interrupted(call, Some(intent.action))))
+            }
+            _ => ask!(self, host => host.call(call, function)),
+        }
+    }
+
+    fn begin(&mut self, call: HostCall<'_>, function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
+        if self.enter() {
+            return self.begin_outside(call, function);
+        }
+        if let (Some(intent), Some(number)) = (self.past.expect_intent(call), call.operation)
+            && !self.ended.contains(&number)
+        {
+            let is_repeated = call.effect.may_be_repeated() && !has_gone_object(call.arguments);
+            if is_repeated {
+                function(call.arguments, Some(intent.action));
+            }
+            let news = (!is_repeated).then(|| after_restart(call, Some(intent.action)));
+            self.open.insert(number, news);
+        }
+        self.ring_at_end();
+    }
+
+    fn inbox(&self) -> Inbox {
+        self.inbox.clone()
+    }
+
+    fn poll(&mut self, round: u64) -> Vec<Incoming> {
+        if self.log.has_failed() {
+            // The signal cuts the end of the run short, if that is where it is.
+            return vec![Incoming::Signal(ProcessSignal::Interrupt), Incoming::Stop];
+        }
+        let pauses = self.control.takes_pause();
+        if pauses {
+            self.control.note_time(self.live.host_mut().monotonic());
+        }
+        let mut contents = if self.enter() {
+            if !self.early.is_empty() {
+                let come = self.inbox.take();
+                std::mem::take(&mut self.early).into_iter().chain(come).for_each(|one| self.inbox.put(one));
+            }
+            let contents = self.live.poll(round);
+            // An arrival, such as the outcome of an effect, cannot be had a second time.
+            if !contents.is_empty() {
+                self.log.write();
+            }
+            contents
+        } else {
+            self.early.extend(self.inbox.take());
+            let contents = self.past.poll(round);
+            self.ring_at_end();
+            contents
+        };
+        if pauses {
+            contents.push(Incoming::Stop);
+        }
+        contents
+    }
+
+    fn check(&mut self, check: RunCheck) {
+        ask!(self, host => host.check(check));
+    }
+
+    fn broken_output_status(&self) -> u8 {
+        if self.is_live() { self.live.broken_output_status() } else { self.past.broken_output_status() }
+    }
+
+    fn hear_of_refusal(&mut self) {
+        self.log.break_off();
+    }
+}

@@ -1,0 +1,296 @@
+//! Runs of ESL programs that outlive their processes.
+//!
+//! A durable run has a folder with a journal: a recording (`esl_replay`) that is written before an effect
+//! leaves that could depend on it. When the process is killed, the next one takes the same course by the
+//! journal, without the outside, and goes on from its end. Programs need no change: tasks, timers, facts and
+//! everything else are restored.
+//!
+//! ```
+//! use esl::host::RealHost;
+//! use esl::program::{self, Source, compile};
+//! use esl_durable::{Durability, Downtime, DurableOptions, DurableRun};
+//! use esl_replay::RunSetup;
+//!
+//! let text = "(define-input go) (assert '(door open)) (princ 1) (wait-for-event go) (princ 2)";
+//! let program = compile(&[Source::new("wait.esl", text)]).program.expect("it compiles");
+//! let folder = std::env::temp_dir().join(format!("esl-durable-{}", std::process::id()));
+//! for _process in 0..2 {
+//!     let run = DurableRun::open(&folder, DurableOptions::default())?;
+//!     let host = RealHost::new(Vec::new()).with_elapsed(run.elapsed()).with_screen(Box::new(|_| Ok(())));
+//!     let mut machine = program::machine(Default::default(), Box::new(run.host(host)))?;
+//!     run.begin(&program, &RunSetup::default(), &machine)?;
+//!     program::begin(&mut machine, &program)?;
+//!     machine.run_ready(10_000);
+//!     run.pause(&machine)?;
+//! }
+//! let state = esl_durable::look(&folder)?;
+//! assert_eq!(state.lives.iter().filter(|life| !life.is_pause).count(), 2);
+//! # std::fs::remove_dir_all(folder)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod control;
+mod difference;
+mod disk;
+mod error;
+mod file_effect;
+mod folder;
+mod host;
+mod log;
+mod look;
+mod resume;
+
+use std::path::Path;
+
+use esl::program::Program;
+use esl_bytecode::module::Module;
+use esl_host::Host;
+use esl_replay::{Beginning, JournalLife, JournalWriter, RecordedError, RunJournal, RunSetup};
+use esl_vm::vm::Vm;
+
+pub use control::{DurableControl, Resumed};
+pub use disk::{Disk, RealDisk};
+pub use error::DurableError;
+pub use host::DurableHost;
+pub use log::LogFigures;
+pub use look::{DurableState, look};
+
+use folder::RunFolder;
+use log::JournalLog;
+use resume::{Resumption, chance, wall_clock};
+
+/// The events that a durable run survives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Durability {
+    /// The end of its process: the journal is passed to the system before an effect leaves.
+    #[default]
+    Process,
+    /// Loss of power too: the journal is synced before an effect leaves.
+    Power,
+}
+
+/// How a gap between two processes counts for the program's clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Downtime {
+    /// As time that has passed, by the clock of the system.
+    #[default]
+    Counts,
+    /// Not at all.
+    Stops,
+}
+
+/// Settings of this process of a durable run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DurableOptions {
+    /// The events that it survives.
+    pub durability: Durability,
+    /// How the gap before it counts.
+    pub downtime: Downtime,
+}
+
+/// A durable run in this process.
+pub struct DurableRun {
+    folder: Option<RunFolder>,
+    log: JournalLog,
+    control: DurableControl,
+    found: Option<FoundRun>,
+}
+
+/// A run that is to go on.
+struct FoundRun {
+    recorded: esl_replay::Recorded,
+    resumption: Resumption,
+}
+
+impl DurableRun {
+    /// Takes the folder of a run, which is made if there is none, and reads its journal.
+    ///
+    /// # Errors
+    /// [`DurableError`].
+    pub fn open(path: &Path, options: DurableOptions) -> Result<DurableRun, DurableError> {
+        let folder = RunFolder::open(path)?;
+        let file = folder.journal();
+        let disk = with_kill(RealDisk::new(file.clone()));
+        let mut run = DurableRun::on(disk, options).map_err(|error| match error {
+            DurableError::NotWritten(error) => DurableError::Folder(file, error),
+            other => other,
+        })?;
+        run.folder = Some(folder);
+        Ok(run)
+    }
+
+    /// Reads the journal on a disk.
+    ///
+    /// # Errors
+    /// [`DurableError`].
+    pub fn on(mut disk: Box<dyn Disk>, options: DurableOptions) -> Result<DurableRun, DurableError> {
+        let bytes = disk.read().map_err(DurableError::NotWritten)?;
+        let control = DurableControl::default();
+        let journal = match bytes.as_deref().map(RunJournal::read) {
+            None | Some(Err(RecordedError::NoBeginning)) => {
+                let log = JournalLog::new(disk, JournalWriter::default(), 0, options.durability);
+                return Ok(DurableRun { folder: None, log, control, found: None });
+            }
+            Some(journal) => journal.map_err(DurableError::Journal)?,
+        };
+        let RunJournal { recorded, lives, length, time, writer } = journal;
+        if !recorded.beginning.is_of_this_machine() {
+            return Err(DurableError::Journal(RecordedError::OtherMachine));
+        }
+        if recorded.torn > 0 {
+            disk.truncate(length as u64).map_err(DurableError::NotWritten)?;
+        } else if options.durability == Durability::Power {
+            // Another process may have left it to the system.
+            disk.sync().map_err(DurableError::NotWritten)?;
+        }
+        let last = lives.last().copied().unwrap_or_default();
+        let resumption = Resumption::new(&last, time, wall_clock(), options.downtime);
+        let log = JournalLog::new(disk, writer, length as u64, options.durability);
+        Ok(DurableRun { folder: None, log, control, found: Some(FoundRun { recorded, resumption }) })
+    }
+
+    /// Returns the status with which the run has ended, if it has.
+    pub fn ended(&self) -> Option<u8> {
+        self.found.as_ref().and_then(|found| found.recorded.end).map(|end| end.status)
+    }
+
+    /// Returns the program and the settings with which the run has begun, unless it begins now.
+    pub fn found(&self) -> Option<&Beginning> {
+        self.found.as_ref().map(|found| &found.recorded.beginning)
+    }
+
+    /// Returns the arguments that the program has asked for, if it has.
+    pub fn arguments(&self) -> Option<&[String]> {
+        let found = self.found.as_ref()?;
+        found.recorded.records.iter().find_map(|noted| match &noted.record {
+            esl_host::Record::Arguments(arguments) => Some(arguments.as_slice()),
+            _ => None,
+        })
+    }
+
+    /// Returns where the program's clock stands, in nanoseconds.
+    pub fn elapsed(&self) -> u64 {
+        self.found.as_ref().map_or(0, |found| found.resumption.elapsed())
+    }
+
+    /// Returns the control of the run.
+    pub fn control(&self) -> DurableControl {
+        self.control.clone()
+    }
+
+    /// Returns the host of the run, whose outside is `host`.
+    pub fn host<H: Host>(&self, host: H) -> DurableHost<H> {
+        self.log.set_inbox(host.inbox());
+        let (records, resumption) = match &self.found {
+            Some(found) => (found.recorded.records.clone(), Some(found.resumption)),
+            None => (Vec::new().into(), None),
+        };
+        DurableHost::new(host, self.log.clone(), self.control.clone(), records, resumption)
+    }
+
+    /// Writes the program and the settings of a new run, or compares them with those of the run that goes on.
+    /// The machine has to be ready for its program.
+    ///
+    /// # Errors
+    /// [`DurableError`].
+    pub fn begin(&self, program: &Program, setup: &RunSetup, machine: &Vm) -> Result<(), DurableError> {
+        let beginning = esl_replay::beginning(program, setup, machine).map_err(DurableError::Program)?;
+        match &self.found {
+            Some(found) => compare(&found.recorded.beginning, &beginning, program),
+            None => {
+                let life =
+                    JournalLife { number: 1, is_pause: false, wall: wall_clock(), time: 0, chance: chance() };
+                self.log.create(&beginning, life);
+                self.check()
+            }
+        }
+    }
+
+    /// Returns the reason for which the run has to stop, if there is one.
+    ///
+    /// # Errors
+    /// [`DurableError`].
+    pub fn check(&self) -> Result<(), DurableError> {
+        if let Some(divergence) = self.control.divergence() {
+            return Err(DurableError::Diverged(divergence));
+        }
+        self.log.take_error().map_or(Ok(()), Err)
+    }
+
+    /// Leaves the run as it is, to go on in another process.
+    ///
+    /// # Errors
+    /// [`DurableError`].
+    pub fn pause(&self, machine: &Vm) -> Result<(), DurableError> {
+        if let Some(life) = self.log.life() {
+            let time = self.control.paused_at().unwrap_or_else(|| machine.last_time());
+            let wall = wall_clock();
+            self.log.note_life(JournalLife { is_pause: true, wall, time, ..life });
+            self.log.finish();
+        }
+        self.check()
+    }
+
+    /// Notes the end of the run.
+    ///
+    /// # Errors
+    /// [`DurableError`].
+    pub fn end(&self, machine: &Vm, status: u8) -> Result<(), DurableError> {
+        self.check()?;
+        if !self.control.is_at_end_of_past() {
+            return Err(DurableError::Diverged("the run has ended, and the journal has more of it".into()));
+        }
+        self.log.end(machine.check(), status);
+        self.check()
+    }
+
+    /// Returns figures of the journal.
+    pub fn figures(&self) -> LogFigures {
+        self.log.figures()
+    }
+}
+
+/// Refuses to go on with a run that has begun with another program or other settings.
+fn compare(found: &Beginning, given: &Beginning, program: &Program) -> Result<(), DurableError> {
+    if found.program != given.program {
+        let before = Program::from_bytes(&found.program).map_err(|error| {
+            DurableError::OtherProgram(format!("the program of the run cannot be read: {error}"))
+        })?;
+        // The name of the file as it is typed may be another one.
+        let renamed = Module { sources: before.module().sources.clone(), ..program.module().clone() };
+        if renamed != *before.module() {
+            return Err(DurableError::OtherProgram(difference::difference(&before, program)));
+        }
+    }
+    let settings = [
+        (found.config == given.config, "other limits, slice or seed"),
+        (found.traces == given.traces, "other traces"),
+        (found.functions == given.functions, "other functions of the host"),
+        (found.has_operators == given.has_operators, "other options for operators"),
+    ];
+    match settings.iter().find(|(is_equal, _)| !is_equal) {
+        Some((_, which)) => Err(DurableError::OtherSettings(which)),
+        None => Ok(()),
+    }
+}
+
+/// Returns a disk; one on which the process is killed, if a test asks for that.
+#[cfg(all(unix, debug_assertions))]
+fn with_kill(disk: RealDisk) -> Box<dyn Disk> {
+    let place = std::env::var("ESL_DURABLE_KILL_AT").ok().and_then(|place| place.parse().ok());
+    match place {
+        Some(place) => Box::new(disk::DeadlyDisk::new(disk, place, || {
+            let own = rustix::process::getpid();
+            // A process that cannot be killed goes on.
+            _ = rustix::process::kill_process(own, rustix::process::Signal::KILL);
+        })),
+        None => Box::new(disk),
+    }
+}
+
+/// Returns a disk.
+#[cfg(not(all(unix, debug_assertions)))]
+fn with_kill(disk: RealDisk) -> Box<dyn Disk> {
+    Box::new(disk)
+}

@@ -1,0 +1,266 @@
+//! The journal while it is written.
+//!
+//! Guarantees: [`JournalLog::commit`] returns true only if all earlier records are as safe as the run
+//! demands. After an error nothing is written any more, and every effect is refused: a system that has
+//! dropped data does not write them at a second try.
+
+use std::io;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use esl_host::{ActionId, Inbox, NotedRecord, Record, Recorder, RunCheck};
+use esl_replay::{
+    Beginning, JournalLife, JournalWriter, RecordedEnd, journal_beginning, journal_end, journal_life,
+};
+
+use super::disk::Disk;
+use super::{Durability, DurableError};
+
+/// Bytes of records that wait at most.
+const BUFFER: usize = 64 << 10;
+
+/// The state of a journal that is being written.
+struct LogWriting {
+    disk: Box<dyn Disk>,
+    writer: JournalWriter,
+    durability: Durability,
+    /// Length of the file.
+    written: u64,
+    /// Length of the part of it that is on the disk.
+    synced: u64,
+    /// Whether the records that are not yet safe have an answer that another process might not get again.
+    is_dear: bool,
+    /// The process that writes; `None` before it has begun to.
+    life: Option<JournalLife>,
+    /// Number of effects of this process.
+    effects: u64,
+    error: Option<DurableError>,
+    /// Rung when there is an error, so that the machine comes back.
+    inbox: Option<Inbox>,
+    figures: LogFigures,
+}
+
+/// Figures of a journal that is being written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LogFigures {
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Writes to it by this process.
+    pub writes: u64,
+    /// Syncs of it by this process.
+    pub syncs: u64,
+    /// Effects of this process.
+    pub effects: u64,
+}
+
+/// A journal that is being written. Clones write the same one.
+#[derive(Clone)]
+pub(crate) struct JournalLog(Arc<Mutex<LogWriting>>);
+
+impl JournalLog {
+    /// Creates the log of a journal that has `length` good bytes, which the disk has.
+    pub(crate) fn new(
+        disk: Box<dyn Disk>,
+        writer: JournalWriter,
+        length: u64,
+        durability: Durability,
+    ) -> JournalLog {
+        JournalLog(Arc::new(Mutex::new(LogWriting {
+            disk,
+            writer,
+            durability,
+            written: length,
+            synced: length,
+            is_dear: false,
+            life: None,
+            effects: 0,
+            error: None,
+            inbox: None,
+            figures: LogFigures::default(),
+        })))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, LogWriting> {
+        // Each frame is written whole or not at all, so a panic elsewhere does not corrupt the journal.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Names the inbox of the machine.
+    pub(crate) fn set_inbox(&self, inbox: Inbox) {
+        self.lock().inbox = Some(inbox);
+    }
+
+    /// Makes the file of a new run. Records that were made before follow.
+    pub(crate) fn create(&self, beginning: &Beginning, life: JournalLife) {
+        let mut writing = self.lock();
+        let mut bytes = journal_beginning(beginning);
+        let mark = bytes.len() as u64;
+        bytes.extend(journal_life(&life, mark));
+        let created = writing.disk.create(&bytes);
+        writing.hear(created);
+        (writing.written, writing.synced) = (bytes.len() as u64, bytes.len() as u64);
+        writing.life = Some(life);
+    }
+
+    /// Notes that this process goes on with the run, or pauses it.
+    pub(crate) fn note_life(&self, life: JournalLife) {
+        let mut writing = self.lock();
+        writing.write();
+        let mark = writing.mark();
+        writing.append(&journal_life(&life, mark));
+        writing.life = Some(life);
+    }
+
+    /// Returns the process that writes, once it has begun to.
+    pub(crate) fn life(&self) -> Option<JournalLife> {
+        self.lock().life
+    }
+
+    /// Notes the end of the run, and syncs the file.
+    pub(crate) fn end(&self, check: RunCheck, status: u8) {
+        let mut writing = self.lock();
+        writing.write();
+        writing.sync();
+        writing.append(&journal_end(&RecordedEnd { status, check }));
+        writing.sync();
+    }
+
+    /// Writes the waiting records, and syncs the file.
+    pub(crate) fn finish(&self) {
+        let mut writing = self.lock();
+        writing.write();
+        writing.sync();
+    }
+
+    /// Writes the waiting records.
+    pub(crate) fn write(&self) {
+        self.lock().write();
+    }
+
+    /// Makes everything that was noted safe. Returns whether it is.
+    pub(crate) fn commit(&self) -> bool {
+        let mut writing = self.lock();
+        writing.write();
+        if writing.durability == Durability::Power && writing.synced < writing.written {
+            writing.sync();
+        }
+        writing.is_safe()
+    }
+
+    /// As [`JournalLog::commit`], for output, which is printed again if the journal does not have its answer.
+    /// Only the answers on which the output may depend have to be safe.
+    pub(crate) fn commit_for_output(&self) -> bool {
+        if self.lock().is_dear {
+            return self.commit();
+        }
+        self.lock().is_safe()
+    }
+
+    /// Returns an identity for the next effect.
+    pub(crate) fn next_action(&self) -> ActionId {
+        let mut writing = self.lock();
+        writing.effects += 1;
+        let chance = writing.life.map_or(0, |life| life.chance);
+        ActionId(u128::from(chance) << 64 | u128::from(writing.effects))
+    }
+
+    /// Returns whether a write has failed.
+    pub(crate) fn has_failed(&self) -> bool {
+        self.lock().error.is_some()
+    }
+
+    /// Takes the error of a write.
+    pub(crate) fn take_error(&self) -> Option<DurableError> {
+        self.lock().error.take()
+    }
+
+    /// Returns figures.
+    pub(crate) fn figures(&self) -> LogFigures {
+        let writing = self.lock();
+        LogFigures { bytes: writing.written, effects: writing.effects, ..writing.figures }
+    }
+}
+
+impl LogWriting {
+    fn is_safe(&self) -> bool {
+        self.error.is_none() && self.life.is_some()
+    }
+
+    fn fail(&mut self, error: DurableError) {
+        self.error.get_or_insert(error);
+        if let Some(inbox) = &self.inbox {
+            inbox.ring();
+        }
+    }
+
+    fn hear(&mut self, result: io::Result<()>) {
+        if let Err(error) = result {
+            self.fail(DurableError::NotWritten(error));
+        }
+    }
+
+    /// Returns the length of the part of the file that is safe.
+    fn mark(&self) -> u64 {
+        match self.durability {
+            Durability::Process => self.written,
+            Durability::Power => self.synced,
+        }
+    }
+
+    fn append(&mut self, bytes: &[u8]) {
+        if self.error.is_none() {
+            let appended = self.disk.append(bytes);
+            self.hear(appended);
+            self.written += bytes.len() as u64;
+            self.figures.writes += 1;
+        }
+    }
+
+    /// Writes the waiting records.
+    fn write(&mut self) {
+        if self.life.is_none() {
+            return;
+        }
+        if !self.writer.is_empty() {
+            let mark = self.mark();
+            let bytes = self.writer.take(mark);
+            self.append(&bytes);
+        }
+        // The kernel has the records, which is enough unless the run survives loss of power.
+        self.is_dear &= self.durability == Durability::Power;
+    }
+
+    fn sync(&mut self) {
+        if self.error.is_none() {
+            let synced = self.disk.sync();
+            self.hear(synced);
+            self.synced = self.written;
+            self.is_dear = false;
+            self.figures.syncs += 1;
+        }
+    }
+}
+
+/// Returns whether another process might get another answer than this one.
+fn is_dear(record: &Record) -> bool {
+    !matches!(record, Record::Written(Ok(())) | Record::PassedOn(Ok(_)) | Record::Checked(_))
+}
+
+impl Recorder for JournalLog {
+    fn note(&self, noted: NotedRecord) {
+        let mut writing = self.lock();
+        if writing.error.is_none() {
+            writing.is_dear |= is_dear(&noted.record);
+            if writing.writer.add(&noted) > BUFFER {
+                writing.write();
+            }
+        }
+    }
+
+    fn flush(&self) {
+        self.write();
+    }
+
+    fn break_off(&self) {
+        self.lock().fail(DurableError::MemoryRefused);
+    }
+}
