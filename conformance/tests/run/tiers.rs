@@ -15,8 +15,13 @@ use esl_conformance::{Expectations, Setting};
 use esl_vm::vm::Tier;
 use libtest_mimic::{Failed, Trial};
 
-/// Programs about what machine code does in a way of its own.
-const ALWAYS: [&str; 2] = ["stdlib/tables_find_integers.esl", "stdlib/tables_find_keys_again.esl"];
+/// Programs about work that machine code does in a way of its own.
+const ALWAYS: [&str; 4] = [
+    "limits/a_clause_that_uses_up_the_reserve_is_not_tried_again.esl",
+    "limits/endless_recursion_through_dynamic_state.esl",
+    "stdlib/tables_find_integers.esl",
+    "stdlib/tables_find_keys_again.esl",
+];
 
 /// Random programs in each test of them.
 const PROGRAMS: u64 = 8;

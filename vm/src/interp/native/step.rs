@@ -78,7 +78,8 @@ pub(super) unsafe fn leave(
     STEP_SIGNAL
 }
 
-/// Handles the charges of a builtin and the requests of an allocation, as the loop does.
+/// Handles the charges of a builtin, the requests of an allocation, and a new end of the stack, as the loop
+/// does.
 ///
 /// # Safety
 /// That of a helper.
@@ -89,6 +90,8 @@ pub(super) unsafe fn attend(context: *mut NativeContext, vm: &mut Vm) {
             (*context).ticks = vm.prepare_safepoint((*context).ticks);
         }
         (*context).is_marking = u32::from(vm.heap.phase() == Phase::Marking);
+        // A control stack that has grown takes room from the stack.
+        (*context).limit = (*context).limit.min(vm.cpu.stack_end().expose_provenance() as u64);
     }
 }
 
