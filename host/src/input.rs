@@ -15,6 +15,13 @@ use super::{HostFailure, Inbox, Incoming, SendError};
 /// Most signals of one input that are on their way to the machine, whatever its rule is: a driver that is
 /// faster than the machine waits.
 const MOST_SENT: usize = 1000;
+/// Most bytes of them, as far as they are like the one that follows.
+const MOST_SENT_BYTES: usize = 16 << 20;
+
+/// Returns the number of signals with so many bytes that may be on their way.
+fn most_sent(bytes: usize) -> usize {
+    (MOST_SENT_BYTES / bytes.max(1)).clamp(1, MOST_SENT)
+}
 
 /// An input of a program, which the program has named in a call. Unlike a [`Sender`](super::Sender) it does
 /// not keep a program that waits from being deadlocked.
@@ -47,8 +54,17 @@ impl HostInput {
     /// # Errors
     /// [`SendError::NoSuchInput`], if the program has removed it, and [`SendError::Ended`].
     pub async fn signal(&self, arguments: Vec<Datum>) -> Result<(), SendError> {
+        self.signal_sized(0, arguments).await
+    }
+
+    /// As [`HostInput::signal`], with arguments of so many bytes: of large ones, fewer are on their way.
+    ///
+    /// # Errors
+    /// As above.
+    pub async fn signal_sized(&self, bytes: usize, arguments: Vec<Datum>) -> Result<(), SendError> {
         poll_fn(|context| {
-            let request = AdmissionRequest { limit: Some(MOST_SENT), waker: Some(context.waker()) };
+            let limit = Some(most_sent(bytes));
+            let request = AdmissionRequest { limit, waker: Some(context.waker()) };
             self.inbox.admission().poll_admit(&self.name, request)
         })
         .await?;
@@ -61,16 +77,16 @@ impl HostInput {
     /// # Errors
     /// [`SendError`].
     pub fn try_signal(&self, arguments: Vec<Datum>) -> Result<(), SendError> {
-        self.try_signal_by(|| arguments)
+        self.try_signal_by(0, || arguments)
     }
 
-    /// Signals the input, as [`HostInput::try_signal`], with the arguments that `make` makes: only if there
-    /// is room.
+    /// Signals the input, as [`HostInput::try_signal`], with the arguments of so many bytes that `make`
+    /// makes: only if there is room.
     ///
     /// # Errors
     /// [`SendError`].
-    pub fn try_signal_by(&self, make: impl FnOnce() -> Vec<Datum>) -> Result<(), SendError> {
-        let request = AdmissionRequest { limit: Some(MOST_SENT), waker: None };
+    pub fn try_signal_by(&self, bytes: usize, make: impl FnOnce() -> Vec<Datum>) -> Result<(), SendError> {
+        let request = AdmissionRequest { limit: Some(most_sent(bytes)), waker: None };
         match self.inbox.admission().poll_admit(&self.name, request) {
             std::task::Poll::Ready(admitted) => admitted?,
             std::task::Poll::Pending => return Err(SendError::Full(self.name.to_string())),
@@ -143,5 +159,15 @@ mod tests {
         let input = HostInput::new(&inbox, "A");
         let sent = std::iter::repeat_with(|| input.try_signal(Vec::new())).take_while(Result::is_ok).count();
         assert_eq!(sent, MOST_SENT);
+        inbox.open_input("B", None);
+        let input = HostInput::new(&inbox, "B");
+        let large = || input.try_signal_by(MOST_SENT_BYTES / 3, Vec::new);
+        assert_eq!(std::iter::repeat_with(large).take_while(Result::is_ok).count(), 3);
+        // One goes whatever it has; small ones go beside it.
+        inbox.open_input("C", None);
+        let input = HostInput::new(&inbox, "C");
+        assert_eq!(input.try_signal_by(10 * MOST_SENT_BYTES, Vec::new), Ok(()));
+        assert!(input.try_signal_by(10 * MOST_SENT_BYTES, Vec::new).is_err());
+        assert_eq!(input.try_signal_by(1, Vec::new), Ok(()));
     }
 }

@@ -66,7 +66,7 @@ impl InputDelivery {
         }
         let mut make = Some(make);
         if kept.arrivals.is_empty() && !kept.is_signalling {
-            let result = self.input.try_signal_by(|| make.take().map_or_else(Vec::new, |make| make()));
+            let result = self.input.try_signal_by(bytes, || make.take().map_or_else(Vec::new, |make| make()));
             match result {
                 Err(SendError::Full(_)) => {}
                 _ => return,
@@ -117,8 +117,8 @@ impl InputDelivery {
             };
             match next {
                 None => self.came.notified().await,
-                Some((arguments, _)) => {
-                    if self.input.signal(arguments).await.is_err() {
+                Some((arguments, bytes)) => {
+                    if self.input.signal_sized(bytes, arguments).await.is_err() {
                         // The program has closed the input, or has ended.
                         return self.end();
                     }

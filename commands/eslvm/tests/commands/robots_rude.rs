@@ -1,5 +1,5 @@
 //! A node of ESL beside peers that break the rules: signs of life that do not fit, payloads that are not
-//! messages, services that never answer.
+//! messages, services that never answer, and floods.
 #![cfg(target_os = "linux")]
 
 use esl_conformance::folder::Folder;
@@ -38,6 +38,14 @@ const PROGRAM: &str = "(require :ros)
                (say (list (length (ros:field (wait-for-event image :timeout 60) :data))
                           (plusp (+ (input-dropped image) (ros:lost node image)))))))))))";
 
+/// Returns the most memory that a process has had, in MB.
+fn most_memory(running: &Running) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", running.child.id()));
+    let status = status.expect("the process runs");
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("the system says it");
+    peak.trim().trim_end_matches(" kB").parse::<u64>().expect("a number") / 1024
+}
+
 #[test]
 fn peers_that_break_the_rules_are_named_once_and_stop_nothing() {
     let Some(python) = python() else { return };
@@ -71,4 +79,12 @@ fn peers_that_break_the_rules_are_named_once_and_stop_nothing() {
     tell(&mut peer, "signs");
     program.tell("count");
     assert_eq!(program.line(), "1");
+    // Messages of a megabyte, of which nobody takes one meanwhile.
+    tell(&mut peer, "flood");
+    program.tell("take");
+    assert_eq!(program.line(), "\"flooded\"");
+    program.tell("image");
+    assert_eq!(program.line(), "(1000000 T)");
+    let memory = most_memory(&program);
+    assert!(memory < 400, "{memory} MB");
 }
