@@ -51,10 +51,16 @@ pub enum Shares {
     Properties,
     /// It changes the value of a special variable.
     Variables,
+    /// It changes a variable that a closure shares with its surroundings. An instruction does so, no builtin.
+    Captured,
+    /// It makes a stream, which other tasks may come to hold.
+    Streams,
+    /// It changes a function, a class or a package.
+    Definitions,
     /// It reads the clock, so that the further course depends on the time.
     Clock,
-    /// It changes something that explorations leave out: a definition, a package, a stream, a file, random
-    /// numbers, or state of the running task.
+    /// It changes something that explorations leave out: a file, the state of a stream that was made
+    /// elsewhere, or of the running task.
     Own,
 }
 
@@ -156,6 +162,12 @@ macro_rules! shares {
     (variables) => {
         Shares::Variables
     };
+    (streams) => {
+        Shares::Streams
+    };
+    (definitions) => {
+        Shares::Definitions
+    };
     (clock) => {
         Shares::Clock
     };
@@ -221,7 +233,7 @@ impl Builtin {
     }
 
     /// Its row.
-    pub fn info(self) -> &'static BuiltinInfo {
+    pub const fn info(self) -> &'static BuiltinInfo {
         &BUILTINS[self as usize]
     }
 
@@ -246,17 +258,21 @@ macro_rules! for_each_builtin {
         $with! {
             // ---- definitions
             /// Makes `function` the global function named by `symbol`, and returns `symbol`.
-            SetFunction = define::set_function, internal "%SET-FUNCTION" ("symbol function") shares own;
+            SetFunction = define::set_function, internal "%SET-FUNCTION" ("symbol function")
+                shares definitions;
             /// Makes `function` the macro function of `symbol`, and returns `symbol`.
-            SetMacro = define::set_macro, internal "%SET-MACRO" ("symbol function") shares own;
+            SetMacro = define::set_macro, internal "%SET-MACRO" ("symbol function") shares definitions;
             /// Makes `symbol` a special variable, and returns it.
-            ProclaimSpecial = define::proclaim_special, internal "%PROCLAIM-SPECIAL" ("symbol") shares own;
+            ProclaimSpecial = define::proclaim_special, internal "%PROCLAIM-SPECIAL" ("symbol")
+                shares definitions;
             /// Makes `symbol`, which does not belong to the language, neither a special variable nor a
             /// constant any more, and returns it.
-            ForgetVariable = define::forget_variable, internal "%FORGET-VARIABLE" ("symbol") shares own;
+            ForgetVariable = define::forget_variable, internal "%FORGET-VARIABLE" ("symbol")
+                shares definitions;
             /// Makes `symbol` a constant with `value`, and returns it. Fails if it is a constant with another
             /// value.
-            DefineConstant = define::define_constant, internal "%DEFINE-CONSTANT" ("symbol value") shares own;
+            DefineConstant = define::define_constant, internal "%DEFINE-CONSTANT" ("symbol value")
+                shares definitions;
 
             // ---- functions and values
             /// Calls `function`, or the function that a symbol names, with `arguments`.
@@ -489,7 +505,7 @@ macro_rules! for_each_builtin {
             MakeRandomState = float::make_random_state, internal "%MAKE-RANDOM-STATE" ("source")
                 shares nothing;
             /// A number from 0 to below `limit`, of its type; moves `state` on.
-            Random = float::random, internal "%RANDOM" ("limit state") shares own;
+            Random = float::random, internal "%RANDOM" ("limit state") shares variables;
             /// Whether `object` is a random state.
             RandomStatep = types::random_state_p, cl "RANDOM-STATE-P" ("object") shares nothing;
 
@@ -860,9 +876,9 @@ macro_rules! for_each_builtin {
                 shares nothing slowly "%SLOW-GETF";
             /// The property list with this property: changed if it is there, else with it in front.
             Putf = lookup::putf, internal "%PUTF" ("plist indicator value")
-                shares properties slowly "%SLOW-PUTF";
+                shares pairs slowly "%SLOW-PUTF";
             /// The property list without this property, and whether it was there.
-            Remf = lookup::remf, internal "%REMF" ("plist indicator") shares properties slowly "%SLOW-REMF";
+            Remf = lookup::remf, internal "%REMF" ("plist indicator") shares pairs slowly "%SLOW-REMF";
             /// Indicator and value of the first property that is among `indicators`, and the tail that begins
             /// there; three times `NIL` if there is none.
             GetProperties = lookup::get_properties, cl "GET-PROPERTIES" ("plist indicators") shares nothing
@@ -1194,7 +1210,7 @@ macro_rules! for_each_builtin {
             /// with `:undefined-function` if there is none.
             Fdefinition = symbol::fdefinition, cl "FDEFINITION" ("name") shares nothing;
             /// Removes the function or macro named by `name`, and returns `name`.
-            Fmakunbound = symbol::fmakunbound, cl "FMAKUNBOUND" ("name") shares own;
+            Fmakunbound = symbol::fmakunbound, cl "FMAKUNBOUND" ("name") shares definitions;
             /// The symbol that keeps the function called `name`: itself, or for `(setf symbol)` one of the
             /// same package.
             FunctionCell = symbol::function_cell, internal "%FUNCTION-CELL" ("name") shares nothing;
@@ -1211,7 +1227,7 @@ macro_rules! for_each_builtin {
             MakeSymbol = symbol::make_symbol, cl "MAKE-SYMBOL" ("name") shares nothing;
             /// A fresh symbol without a package, named by `prefix` and a number: `*gensym-counter*`, or
             /// `prefix` itself.
-            Gensym = symbol::gensym, cl "GENSYM" ("&optional prefix") shares own;
+            Gensym = symbol::gensym, cl "GENSYM" ("&optional prefix") shares variables;
             /// The name of a function, as its definition gives it, or `NIL`.
             FunctionName = symbol::function_name, internal "%FUNCTION-NAME" ("function") shares nothing;
             /// The lambda list of a function as it was written.
@@ -1241,24 +1257,27 @@ macro_rules! for_each_builtin {
             ListAllPackages = package::list_all_packages, cl "LIST-ALL-PACKAGES" ("") shares nothing;
             /// The package of this name, made if there is none, with these nicknames, and using these
             /// packages.
-            MakePackage = package::make_package, internal "%MAKE-PACKAGE" ("name nicknames uses") shares own;
+            MakePackage = package::make_package, internal "%MAKE-PACKAGE" ("name nicknames uses")
+                shares definitions;
             /// Takes its names from a package that could not be made whole.
-            ForgetPackage = package::forget_package, internal "%FORGET-PACKAGE" ("package") shares own;
+            ForgetPackage = package::forget_package, internal "%FORGET-PACKAGE" ("package")
+                shares definitions;
             /// Lets `package` inherit the external symbols of `packages`, a package or a list of packages.
-            UsePackage = package::use_package, cl "USE-PACKAGE" ("packages &optional package") shares own;
+            UsePackage = package::use_package, cl "USE-PACKAGE" ("packages &optional package")
+                shares definitions;
             /// Makes `symbols`, a symbol or a list of symbols, external in `package`.
-            Export = package::export, cl "EXPORT" ("symbols &optional package") shares own;
+            Export = package::export, cl "EXPORT" ("symbols &optional package") shares definitions;
             /// Makes `symbols`, a symbol or a list of symbols, present in `package`.
-            Import = package::import, cl "IMPORT" ("symbols &optional package") shares own;
+            Import = package::import, cl "IMPORT" ("symbols &optional package") shares definitions;
             /// Makes `symbols`, a symbol or a list of symbols, present in `package`, in place of others of
             /// their names.
             ShadowingImport = package::shadowing_import, cl "SHADOWING-IMPORT" ("symbols &optional package")
-                shares own;
+                shares definitions;
             /// Gives `package` symbols of its own by these names. Returns `T`.
-            Shadow = package::shadow, cl "SHADOW" ("names &optional package") shares own;
+            Shadow = package::shadow, cl "SHADOW" ("names &optional package") shares definitions;
             /// The symbol that `name` denotes in `package`, made if there is none; and how the package has
             /// it, `NIL` for new.
-            Intern = package::intern, cl "INTERN" ("name &optional package") shares own;
+            Intern = package::intern, cl "INTERN" ("name &optional package") shares definitions;
             /// The symbol that `name` denotes in `package`, and how the package has it; `NIL` twice if there
             /// is none.
             FindSymbol = package::find_symbol, cl "FIND-SYMBOL" ("name &optional package") shares nothing;
@@ -1279,7 +1298,7 @@ macro_rules! for_each_builtin {
             MakeClass = class::make_class, internal "%MAKE-CLASS" ("name supers slots data") shares nothing;
             /// Makes `class` the class of this name, which does not belong to the language; with `NIL`, there
             /// is none of this name any more. Instances keep their class.
-            SetClass = class::set_class, internal "%SET-CLASS" ("name class") shares own;
+            SetClass = class::set_class, internal "%SET-CLASS" ("name class") shares definitions;
             /// The class of this name, or `NIL`.
             FindClass = class::find_class, internal "%FIND-CLASS" ("name") shares nothing;
             /// The class of a structure or condition, `NIL` for everything else.
@@ -1295,7 +1314,8 @@ macro_rules! for_each_builtin {
             /// The library's data about a class.
             ClassData = class::class_data, internal "%CLASS-DATA" ("class") shares nothing;
             /// Makes `data` the library's data about a class, and returns it.
-            SetClassData = class::set_class_data, internal "%SET-CLASS-DATA" ("class data") shares own;
+            SetClassData = class::set_class_data, internal "%SET-CLASS-DATA" ("class data")
+                shares definitions;
             /// Whether `class` is `ancestor` or inherits from it.
             SubclassP = class::subclass_p, internal "%SUBCLASS-P" ("class ancestor") shares nothing;
             /// A fresh instance of a class, or of the class of that name. Slots without a value are `NIL`.
@@ -1317,7 +1337,7 @@ macro_rules! for_each_builtin {
             /// Records that the function `name` reads slot `slot` of the class named `class`. Comes after the
             /// function.
             DefineAccessor = class::define_accessor, internal "%DEFINE-ACCESSOR"
-                ("name class slot access") shares own;
+                ("name class slot access") shares definitions;
 
             // ---- instances of the classes of DEFCLASS
             /// A fresh instance of a class, with a layout and a simple vector of the values of its slots.
@@ -1339,7 +1359,8 @@ macro_rules! for_each_builtin {
             SetCachedSlotValue = instance::set_slot_value, internal "%SET-SLOT-VALUE"
                 ("instance name cache value") shares slots slowly "%SLOW-SET-SLOT-VALUE";
             /// Gives a class other direct superclasses. Its subclasses have to be updated in turn.
-            UpdateClass = instance::update_class, internal "%UPDATE-CLASS" ("class supers") shares own;
+            UpdateClass = instance::update_class, internal "%UPDATE-CLASS" ("class supers")
+                shares definitions;
             /// The item after the class of `object` in `cache`, a simple vector of classes and items in turn;
             /// `NIL` if the class is not in it.
             CachedMethods = instance::cached_methods, internal "%CACHED-METHODS" ("cache object")
@@ -1394,10 +1415,10 @@ macro_rules! for_each_builtin {
             StandardStream = stream::standard_stream, internal "%STANDARD-STREAM" ("number") shares nothing;
             /// A stream that reads the characters of `string` from `start` to before `end`.
             MakeStringInput = stream::make_string_input, internal "%MAKE-STRING-INPUT" ("string start end")
-                shares nothing
+                shares streams
                 slowly "%SLOW-MAKE-STRING-INPUT";
             /// A stream that reads from `string`, which it owns from now on.
-            ReadFromCopy = stream::read_from_copy, internal "%READ-FROM-COPY" ("string") shares nothing;
+            ReadFromCopy = stream::read_from_copy, internal "%READ-FROM-COPY" ("string") shares streams;
             /// How many characters such a stream has read; if `as_rest`, how many bytes in UTF-8 are left of
             /// those that it has.
             StringInputPosition = stream::string_input_position,
@@ -1407,7 +1428,7 @@ macro_rules! for_each_builtin {
             SetStringInputPosition = stream::set_string_input_position,
                 internal "%SET-STRING-INPUT-POSITION" ("stream position") shares own;
             /// A stream that gathers its output in a string.
-            MakeStringOutput = stream::make_string_output, internal "%MAKE-STRING-OUTPUT" ("") shares nothing;
+            MakeStringOutput = stream::make_string_output, internal "%MAKE-STRING-OUTPUT" ("") shares streams;
             /// The characters that a string stream has gathered since the last call.
             GetOutputStreamString = stream::get_output_stream_string, cl "GET-OUTPUT-STREAM-STRING" ("stream")
                 shares own
@@ -1445,7 +1466,7 @@ macro_rules! for_each_builtin {
             WriteBytes = stream::write_bytes, internal "%WRITE-BYTES" ("path vector mode") shares own;
             /// A stream whose operations are written in ESL, over `data`.
             MakeCustomStream = stream::make_custom_stream, internal "%MAKE-CUSTOM-STREAM" ("data")
-                shares nothing;
+                shares streams;
             /// The data of such a stream; `NIL` for any other object.
             CustomStreamData = stream::custom_stream_data, internal "%CUSTOM-STREAM-DATA" ("stream")
                 shares nothing;
@@ -1453,7 +1474,7 @@ macro_rules! for_each_builtin {
             /// `direction` is 1, for writing if it is 2, otherwise for both. `file` is the name of the file,
             /// or `NIL`.
             MakeChannel = stream::make_channel, internal "%MAKE-CHANNEL" ("handler file direction")
-                shares own;
+                shares streams;
             /// The handler of a channel; `NIL` for any other object.
             ChannelHandler = stream::channel_handler, internal "%CHANNEL-HANDLER" ("object") shares nothing;
             /// The string stream that buffers the output to a channel.

@@ -21,6 +21,7 @@ pub mod operand;
 pub mod package;
 pub mod packed;
 pub mod properties;
+pub mod sharing;
 pub mod signature;
 pub mod span;
 pub mod symbol;

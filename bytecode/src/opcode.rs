@@ -358,6 +358,11 @@ macro_rules! for_each_opcode {
             // ---- counting
             /// Counts that control passes the place with this number, if the machine is asked to. Not a tick.
             Pass = 0x86, "pass", silent { place: PassIdx }, quiet cold::pass;
+
+            // ---- exploring
+            /// Stands before an instruction that uses a place which other tasks may reach. If schedules are
+            /// explored strictly, the task lets others go first here. Not a tick.
+            Point = 0x87, "point", silent {}, does point::point;
         }
     };
 }

@@ -5,7 +5,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
 use esl::module_path::ModulePath;
-use esl::program::{Compiled, Source, compile_for_run};
+use esl::program::{Compiled, Instrumentation, Source, compile_for_run};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
 use esl_vm::vm::Config;
@@ -129,7 +129,7 @@ fn look_at(checked: &CheckedText) -> HashMap<String, Vec<ShownDiagnostic>> {
     let name = path_of(&checked.uri).display().to_string();
     let source = Source::new(name.clone(), checked.text.as_str());
     let config = Config { budget: Some(BUDGET), ..Config::DEFAULT };
-    let compiled = compile_for_run(&[source], &checked.path, false, &config, &mut |_| {});
+    let compiled = compile_for_run(&[source], &checked.path, Instrumentation::None, &config, &mut |_| {});
     let mut texts = ShownTexts { checked, name, compiled: &compiled, known: HashMap::new() };
     let mut found: HashMap<String, Vec<ShownDiagnostic>> = HashMap::new();
     found.insert(checked.uri.as_str().to_owned(), Vec::new());

@@ -77,6 +77,19 @@ pub fn compile_covered(sources: &[Source], path: &ModulePath) -> Compiled {
     compile_in(Compiler::default().covered(), sources, path, Modules::Inside, Config::DEFAULT, &mut |_| {})
 }
 
+/// Compiles sources and their modules to one program with points before the uses of places that tasks may
+/// share, for strict explorations and for reports.
+pub fn compile_with_points(sources: &[Source], path: &ModulePath) -> Compiled {
+    compile_in(
+        Compiler::default().with_points(),
+        sources,
+        path,
+        Modules::Inside,
+        Config::DEFAULT,
+        &mut |_| {},
+    )
+}
+
 fn compile_in(
     mut compiler: Compiler,
     sources: &[Source],
@@ -110,14 +123,25 @@ const LEAST_MEMORY: usize = 32 << 20;
 /// Least budget of a compilation: a fraction of a second.
 const LEAST_BUDGET: u64 = 20_000_000;
 
+/// Instructions that a program is compiled with beside its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Instrumentation {
+    /// None.
+    #[default]
+    None,
+    /// Those by which a machine counts the passages of places.
+    Passages,
+    /// Points before the uses of places that tasks may share.
+    Points,
+}
+
 /// Compiles sources and their modules to one program, for a run with the settings `config`: the compilation
 /// has the same memory and the same budget, or 32 MiB and 20 million ticks if these are more. `watch`
-/// receives the inbox into which a signal is put that is to stop it. If `is_covered`, a machine can count
-/// the passages of the program.
+/// receives the inbox into which a signal is put that is to stop it.
 pub fn compile_for_run(
     sources: &[Source],
     path: &ModulePath,
-    is_covered: bool,
+    instrumentation: Instrumentation,
     config: &Config,
     watch: &mut dyn FnMut(Inbox),
 ) -> Compiled {
@@ -126,7 +150,11 @@ pub fn compile_for_run(
         budget: config.budget.map(|budget| budget.max(LEAST_BUDGET)),
         ..Config::DEFAULT
     };
-    let compiler = if is_covered { Compiler::default().covered() } else { Compiler::default() };
+    let compiler = match instrumentation {
+        Instrumentation::None => Compiler::default(),
+        Instrumentation::Passages => Compiler::default().covered(),
+        Instrumentation::Points => Compiler::default().with_points(),
+    };
     compile_in(compiler, sources, path, Modules::Inside, config, watch)
 }
 

@@ -31,7 +31,8 @@ use esl_bytecode::{disasm, file};
 use esl_vm::load::LoadError;
 
 pub use compile::{
-    Compiled, Modules, compile, compile_covered, compile_for_run, compile_on, compile_with, expand,
+    Compiled, Instrumentation, Modules, compile, compile_covered, compile_for_run, compile_on, compile_with,
+    compile_with_points, expand,
 };
 pub use esl_vm::explore::Settings;
 pub use identity::{EXECUTION_EPOCH, ExecutionIdentity};

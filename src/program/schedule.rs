@@ -11,8 +11,8 @@
 //! end
 //! ```
 //!
-//! The machine is the epoch of its behaviour and a checksum of its library: on another one, choices lead
-//! elsewhere.
+//! Behind the grain, `strict` means a program that is compiled with points. The machine is the epoch of its
+//! behaviour and a checksum of its library: on another one, choices lead elsewhere.
 
 use std::fmt;
 
@@ -48,6 +48,8 @@ pub struct Schedule {
     /// Checksum of the program.
     program: u32,
     grain: Grain,
+    /// Whether tasks stop at the points of the program, which is compiled with them.
+    strict: bool,
     timers: TimerGrain,
     turn: u32,
     choices: Vec<u32>,
@@ -84,8 +86,8 @@ impl std::error::Error for ScheduleError {}
 impl Schedule {
     /// Returns the schedule with these choices, which an exploration with these settings has found.
     pub fn new(program: &Program, settings: &Settings, choices: Vec<u32>) -> Schedule {
-        let Settings { grain, timers, turn, .. } = *settings;
-        Schedule { machine: this_machine(), program: checksum(program), grain, timers, turn, choices }
+        let Settings { grain, strict, timers, turn, .. } = *settings;
+        Schedule { machine: this_machine(), program: checksum(program), grain, strict, timers, turn, choices }
     }
 
     /// Parses the text of a file.
@@ -112,6 +114,7 @@ impl Schedule {
         let program = hexadecimal(field(3, "program", "`program` and a checksum")?);
         let program = program.ok_or(wrong(3, "a checksum in hexadecimal digits"))?;
         let grain = field(4, "grain", "`grain`, and `changes`, `reads`, `variables` or `ticks`")?;
+        let (grain, strict) = grain.strip_suffix(" strict").map_or((grain, false), |grain| (grain, true));
         let grain = Grain::from_name(grain).ok_or(wrong(4, "`changes`, `reads`, `variables` or `ticks`"))?;
         let timers = field(5, "timers", "`timers idle` or `timers any`")?;
         let timers = TimerGrain::from_name(timers).ok_or(wrong(5, "`idle` or `any`"))?;
@@ -124,7 +127,7 @@ impl Schedule {
         if !is_whole {
             return Err(wrong(8, "`end`, and nothing more"));
         }
-        Ok(Schedule { machine, program, grain, timers, turn, choices })
+        Ok(Schedule { machine, program, grain, strict, timers, turn, choices })
     }
 
     /// Returns whether the schedule was found by a machine that behaves as this one does.
@@ -139,7 +142,14 @@ impl Schedule {
 
     /// Returns the settings with which the choices lead to where they were found.
     pub fn settings(&self) -> Settings {
-        Settings { grain: self.grain, timers: self.timers, turn: self.turn, ..Settings::default() }
+        let Schedule { grain, strict, timers, turn, .. } = *self;
+        Settings { grain, strict, timers, turn, ..Settings::default() }
+    }
+
+    /// Returns whether it is of the program as [`compile_with_points`](super::compile_with_points) compiles
+    /// it.
+    pub fn is_strict(&self) -> bool {
+        self.strict
     }
 
     /// Returns the choices.
@@ -151,9 +161,10 @@ impl Schedule {
 impl fmt::Display for Schedule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (grain, timers) = (self.grain.name(), self.timers.name());
+        let strict = if self.strict { " strict" } else { "" };
         let (epoch, library) = self.machine;
         write!(f, "{HEADER}\nmachine {epoch}-{library:08x}\nprogram {:08x}\n", self.program)?;
-        write!(f, "grain {grain}\ntimers {timers}\nturn {}\nchoices", self.turn)?;
+        write!(f, "grain {grain}{strict}\ntimers {timers}\nturn {}\nchoices", self.turn)?;
         self.choices.iter().try_for_each(|choice| write!(f, " {choice}"))?;
         writeln!(f, "\n{END}")
     }
@@ -182,7 +193,10 @@ mod tests {
         assert_eq!((schedule.to_string().as_str(), schedule.choices()), (good, &[0, 3][..]));
         let Settings { grain, timers, turn, .. } = schedule.settings();
         assert_eq!((grain, timers, turn), (Grain::Reads, TimerGrain::Any, 500));
-        assert!(!schedule.is_of_this_machine());
+        assert!(!schedule.is_of_this_machine() && !schedule.is_strict());
+        let strict = good.replace("reads", "reads strict");
+        let schedule = Schedule::parse(&strict).expect("it is a schedule");
+        assert_eq!((schedule.to_string(), schedule.is_strict()), (strict, true));
         let line = |text: &str| match Schedule::parse(text) {
             Err(ScheduleError::Line { line, .. }) => line,
             other => panic!("{text}: {other:?}"),

@@ -7,7 +7,8 @@
 
 use std::fmt;
 
-use esl_bytecode::file::{self, ImageBytes, ModuleImage};
+use esl_bytecode::file::{self, ImageBytes, ModuleImage, ReadError};
+use esl_bytecode::module::Module;
 use esl_bytecode::symbol::{ESL_PACKAGE, USER_PACKAGE};
 use esl_vm::load::LoadError;
 use esl_vm::run::CallError;
@@ -72,6 +73,14 @@ pub fn has_operators(machine: &Vm) -> bool {
 pub fn checksum() -> u32 {
     let of = |image| file::checksum(image).unwrap_or(0);
     of(LIBRARY) ^ of(OPERATORS).rotate_left(16)
+}
+
+/// Returns the library that every machine has, as a whole.
+///
+/// # Errors
+/// [`ReadError`], if the image is damaged.
+pub fn module() -> Result<Module, ReadError> {
+    ModuleImage::open_trusted(ImageBytes::Static(LIBRARY))?.to_module()
 }
 
 fn open(machine: &mut Vm, name: &'static str, bytes: &'static [u8]) -> Result<(), StdlibError> {

@@ -222,7 +222,18 @@ list_state! { Deliveries { signals: Run, held: Run } }
 list_state! { EndOfAll { left: Run } }
 list_state! { Counts { alive: Run, foreground: Run, made: Run, made_at_end: Run, turns: Run, switches: Run } }
 list_state! { Clock { is_virtual: Process, now: Run, looked_at: Run, moved_at: Run, more_is_due: Run, idled: Run } }
-list_state! { Points { grain: Process, has_clock: Process, is_open: Run, has_shown: Run, asked: Run, chosen: Run, uses: Process } }
+list_state! { Points {
+    grain: Process,
+    has_clock: Process,
+    is_open: Run,
+    has_shown: Run,
+    asked: Run,
+    chosen: Run,
+    is_strict: Process,
+    uses: Process,
+    place: Process,
+    objects: Process,
+} }
 list_state! { Turn {
     index: Run,
     end: Derived,

@@ -47,6 +47,8 @@ pub(super) struct ModuleBuilder<'a> {
     pub(super) oversized: Vec<OversizedFunction>,
     /// Number of registers in use from which on new variables go to the heap; `None` for never.
     pub(super) spills_from: Option<u8>,
+    /// Whether points stand before uses of places that tasks may share.
+    pub(super) has_points: bool,
 }
 
 impl<'a> ModuleBuilder<'a> {
@@ -65,6 +67,7 @@ impl<'a> ModuleBuilder<'a> {
             tagbodies: vec![Reg(0); core.tagbodies.len()],
             oversized: Vec::new(),
             spills_from: None,
+            has_points: false,
         }
     }
 
@@ -83,6 +86,7 @@ impl<'a> ModuleBuilder<'a> {
             tagbodies,
             oversized,
             spills_from,
+            has_points,
         } = self;
         SuspendedBuilder {
             resolution,
@@ -95,6 +99,7 @@ impl<'a> ModuleBuilder<'a> {
             tagbodies,
             oversized,
             spills_from,
+            has_points,
         }
     }
 
@@ -131,6 +136,7 @@ pub(super) struct SuspendedBuilder {
     tagbodies: Vec<Reg>,
     oversized: Vec<OversizedFunction>,
     spills_from: Option<u8>,
+    has_points: bool,
 }
 
 impl SuspendedBuilder {
@@ -149,6 +155,7 @@ impl SuspendedBuilder {
             tagbodies: self.tagbodies,
             oversized: self.oversized,
             spills_from: self.spills_from,
+            has_points: self.has_points,
         }
     }
 }
@@ -291,6 +298,9 @@ impl<'b, 'a> FunctionBuilder<'b, 'a> {
 
     /// Appends an instruction.
     pub(super) fn emit(&mut self, instr: Instr) {
+        if self.module.has_points && instr.sharing().is_some() {
+            self.graph.push(Instr::Point {}, None, self.span);
+        }
         self.graph.push(instr, None, self.span);
     }
 

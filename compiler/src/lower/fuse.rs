@@ -117,7 +117,9 @@ fn rotate(graph: &mut Graph) {
         let from = position.max(positions[head.index()]);
         let is_back = |label: SegmentLabel| positions[label.index()] <= from;
         let pays = (is_back(holds) && cond.loops(true)) || (is_back(fails) && cond.loops(false));
-        if !pays || test.ops.len() > ROTATED_LENGTH || test.ops.iter().any(|op| op.landing.is_some()) {
+        // Points change no loop's shape, so that a program has the same ticks with them.
+        let length = test.ops.iter().filter(|op| op.instr != Instr::Point {}).count();
+        if !pays || length > ROTATED_LENGTH || test.ops.iter().any(|op| op.landing.is_some()) {
             continue;
         }
         let (ops, exit, span, scope) = (test.ops.clone(), test.exit, test.span, test.scope);

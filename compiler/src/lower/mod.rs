@@ -84,6 +84,8 @@ pub struct Lowering {
     oversized: Option<Vec<Diagnostic>>,
     /// Limits that are left for dividing functions.
     limits: std::slice::Iter<'static, split::Limits>,
+    /// Whether points stand before uses of places that tasks may share.
+    has_points: bool,
 }
 
 /// The next step of a [`Lowering`].
@@ -101,7 +103,15 @@ impl Lowering {
     /// Begins to lower a top-level form.
     pub fn new(core: Core) -> Lowering {
         let limits = split::LIMITS.iter();
-        Lowering { core, stage: LoweringStage::Begin, is_in_parts: false, oversized: None, limits }
+        let stage = LoweringStage::Begin;
+        Lowering { core, stage, is_in_parts: false, oversized: None, limits, has_points: false }
+    }
+
+    /// Puts points before uses of places that tasks may share, if wanted.
+    #[must_use]
+    pub fn with_points(mut self, has_points: bool) -> Lowering {
+        self.has_points = has_points;
+        self
     }
 
     /// Returns about how many bytes it takes.
@@ -153,6 +163,7 @@ impl Lowering {
                     }
                     let mut builder = ModuleBuilder::new(&self.core, walk.finish(&self.core), lines);
                     builder.spills_from = self.oversized.is_some().then_some(SPILLS_FROM);
+                    builder.has_points = self.has_points;
                     self.stage = LoweringStage::Functions(Box::new(builder.suspend()), Vec::new());
                 }
                 LoweringStage::Functions(builder, mut functions) => {

@@ -54,6 +54,8 @@ pub(super) struct CompilationState {
     pub(super) listing: Option<String>,
     /// Places whose passages are counted, if they are.
     pub(super) places: Option<Vec<CountedPlace>>,
+    /// Whether points stand before uses of places that tasks may share.
+    pub(super) points: bool,
 }
 
 /// A chunk that is being lowered.
@@ -266,7 +268,11 @@ impl CompilationState {
         if let Some(places) = &mut self.places {
             cover(&mut core, &self.lines, places);
         }
-        self.lowering = Some(Box::new(ChunkLowering { lowering: Lowering::new(core), purpose, span }));
+        self.lowering = Some(Box::new(ChunkLowering {
+            lowering: Lowering::new(core).with_points(self.points),
+            purpose,
+            span,
+        }));
     }
 
     /// Goes on lowering a chunk, if there is one, and returns the next step, if that leads to one.

@@ -41,6 +41,8 @@ pub struct Compiler {
     apart: bool,
     /// Whether passages of places are counted.
     covered: bool,
+    /// Whether points stand before uses of places that tasks may share.
+    points: bool,
 }
 
 impl Compiler {
@@ -60,6 +62,13 @@ impl Compiler {
     #[must_use]
     pub fn covered(mut self) -> Compiler {
         self.covered = true;
+        self
+    }
+
+    /// Has texts compiled with points before the uses of places that tasks may share, for explorations.
+    #[must_use]
+    pub fn with_points(mut self) -> Compiler {
+        self.points = true;
         self
     }
 
@@ -110,6 +119,7 @@ impl Compiler {
             diagnostics: Vec::new(),
             listing: None,
             places: None,
+            points: self.points,
         }
     }
 }

@@ -20,6 +20,8 @@
 //! ```
 
 mod forms;
+mod library;
+mod random;
 mod unseen;
 mod verdict;
 
@@ -33,6 +35,8 @@ pub use esl_vm::explore::{
 use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Vm};
 pub use forms::SourceForms;
+pub use library::function_symbol;
+pub use random::{RandomFound, RandomSettings, explore_randomly};
 pub use unseen::{UnseenChange, UnseenKind, reads_clock, unseen_changes};
 pub use verdict::{ExplorationScope, grains};
 
@@ -119,7 +123,63 @@ fn side_by_side(others: Vec<Box<dyn FnOnce() + Send + '_>>, own: &mut dyn FnMut(
 /// # Errors
 /// As [`program::run`].
 pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result<Behaviour, Error> {
-    let (mut machine, main, captured) = begin(program, &|_| Ok(()), false)?;
+    follow_with(program, settings, choices, &|_| Ok(()))
+}
+
+/// Returns the choices of an ending with as few as possible of those taken away that are not the first one:
+/// an order of tasks that does not matter is left as it is without them.
+///
+/// # Errors
+/// As [`program::run`], and the errors of `prepare`.
+pub fn shortest(
+    program: &Program,
+    settings: &Settings,
+    choices: &[u32],
+    prepare: Prepare<'_>,
+) -> Result<Vec<u32>, Error> {
+    let end = |choices: &[u32]| follow_with(program, settings, choices, prepare);
+    let is_same = |other: &Behaviour, wanted: &Behaviour| {
+        (&other.ended, &other.errors) == (&wanted.ended, &wanted.errors)
+    };
+    let wanted = end(choices)?;
+    let mut best = choices.to_vec();
+    let mut runs = 0;
+    let mut at = best.len();
+    while at > 0 && runs < MOST_TRIALS {
+        at -= 1;
+        if best[at] == 0 {
+            continue;
+        }
+        let without = |rest: &[u32]| [&best[..at], &[0], rest].concat();
+        let shorter = [without(&[]), without(&best[at + 1..])];
+        for candidate in shorter {
+            runs += 1;
+            if is_same(&end(&candidate)?, &wanted) {
+                best = candidate;
+                break;
+            }
+        }
+    }
+    while best.last() == Some(&0) {
+        best.pop();
+    }
+    Ok(best)
+}
+
+/// Runs that are made to shorten a schedule, at most.
+const MOST_TRIALS: usize = 200;
+
+/// As [`follow`], on a machine that `prepare` has changed.
+///
+/// # Errors
+/// As [`program::run`], and the errors of `prepare`.
+pub fn follow_with(
+    program: &Program,
+    settings: &Settings,
+    choices: &[u32],
+    prepare: Prepare<'_>,
+) -> Result<Behaviour, Error> {
+    let (mut machine, main, captured) = begin(program, prepare, false)?;
     let outcome = machine.follow(settings, choices);
     let ended = program::end(&mut machine, main, outcome);
     Ok(Behaviour { ended, output: captured.output(), errors: captured.error() })
@@ -127,7 +187,7 @@ pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result
 
 /// Follows a list of choices, on a machine that `prepare` has changed, to the end of the run if `ends`, else
 /// to the last of them. `told` is told of each choice that is not the first one, just before it is made, and
-/// of each use of a variable of the program, after it.
+/// of each use of a place that tasks may share, after it.
 ///
 /// # Errors
 /// As [`program::run`], and the errors of `prepare`.

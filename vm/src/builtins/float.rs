@@ -226,6 +226,7 @@ pub(super) fn make_random_state(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn random(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [limit, state] = exactly(arguments);
+    vm.scheduler.points.note_shown();
     match crate::number::sign_of(&vm.heap, limit) {
         Some(1) if vm.heap.ratio(limit).is_none() => {
             vm.with_numbers(|numbers| random::random(numbers, limit, state))

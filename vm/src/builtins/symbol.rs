@@ -242,6 +242,7 @@ pub(super) fn gensym(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             None => return vm.exchange.not_written(given, "(OR STRING UNSIGNED-BYTE)"),
         },
     };
+    vm.scheduler.points.note_shown();
     let number = match vm.symbol_value(counter) {
         None => Value::small(1),
         Some(value) if value.as_index().is_some() => value,

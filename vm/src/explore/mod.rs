@@ -11,6 +11,7 @@
 //! worker        this thread, or several, among which the runs are divided
 //! keep          returning to places of that tree
 //! livelock      ways round that are fair to all
+//! random        runs by random priorities
 //! ```
 //!
 //! **Points.** A task is assumed to run undisturbed from one *point* to the next. It stands at a point just
@@ -56,6 +57,7 @@ mod live;
 mod livelock;
 mod numbers;
 mod point;
+mod random;
 mod search;
 mod step;
 #[cfg(test)]
@@ -70,6 +72,7 @@ use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
 pub use point::FollowedRun;
+pub use random::{RandomRun, RandomSchedule};
 use search::Search;
 pub use step::{ScheduleEvent, ScheduleStep, StandingTask, Switch, TellStep};
 use trace::{MergePlace, Merged, Merging, TraceEnd};
@@ -126,6 +129,9 @@ pub struct Settings {
     /// Whether states also differ by what was written to standard output. Without this, an ending stands for
     /// all runs that passed through the same states, whatever they had written before.
     pub output: bool,
+    /// Whether tasks also stop before each use of a place that others may reach, in a program that was
+    /// compiled with points.
+    pub strict: bool,
     /// Whether states also differ by the time, because the program reads the clock. Without this, times are
     /// relative to the time of the state. At grain `ticks`, states always differ by it.
     pub clock: bool,
@@ -143,6 +149,7 @@ impl Default for Settings {
             switches: None,
             faults: None,
             output: true,
+            strict: false,
             clock: false,
         }
     }

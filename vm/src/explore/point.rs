@@ -2,7 +2,9 @@
 
 use smallvec::SmallVec;
 
-use super::step::{Runnable, ScheduleEvent, ScheduleStep, TellStep, is_of_library, switch, tell_uses};
+use super::step::{
+    Runnable, ScheduleEvent, ScheduleStep, TellStep, is_of_library, switch, tell_step, tell_uses,
+};
 use super::{Settings, TimerGrain};
 use crate::heap::Kind;
 use crate::heap::layout::SymbolObject;
@@ -50,6 +52,7 @@ impl Vm {
     /// Makes tasks stop at points no longer.
     pub fn end_following(&mut self) {
         self.scheduler.points.grain = None;
+        self.scheduler.points.is_strict = false;
     }
 
     /// Runs the program from point to point along a list of choices found by [`super::explore`] with the same
@@ -84,6 +87,7 @@ fn follow(
 ) -> Option<RunOutcome> {
     explore_by(vm, settings);
     vm.scheduler.points.uses = told.is_some().then(Vec::new);
+    vm.scheduler.points.objects.clear();
     let mut choices = choices.iter().copied();
     let mut watched = 0;
     let mut next = |vm: &mut Vm, runnable: Runnable<'_>| {
@@ -105,6 +109,11 @@ fn follow(
             let event = ScheduleEvent::Switch(switch(vm, runnable, choice));
             told(ScheduleStep { time: vm.scheduler.clock.now, event });
         }
+        if let (None, Some(&index), Some(told)) =
+            (runnable.ways, runnable.tasks.get(choice as usize), &mut told)
+        {
+            tell_step(vm, index, *told);
+        }
         Some(choice)
     };
     let mut run = PointRun::begin(vm, settings);
@@ -120,6 +129,7 @@ fn follow(
 /// Makes tasks stop at points from now on.
 pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.scheduler.points.grain = Some(settings.grain);
+    vm.scheduler.points.is_strict = settings.strict;
     // At a tick a task may hold a time that the library has read, such as the deadline of a sleep; relative
     // times do not tell whether that has passed.
     vm.scheduler.points.has_clock = settings.clock || settings.grain == Grain::Ticks;

@@ -1,11 +1,16 @@
 //! The alternatives at a point, and the events of a schedule, as reports show them.
 
+use esl_bytecode::opcode::Opcode;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
+use esl_bytecode::word::Word;
 
 use crate::describe::describe;
+use crate::heap::Kind;
+use crate::interp::frames::Frames;
+use crate::names::class;
 use crate::report::{program_place, task_label};
-use crate::schedule::VariableUse;
-use crate::task::TaskIndex;
+use crate::schedule::{PlaceUse, UsedPlace};
+use crate::task::{Task, TaskIndex};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -76,16 +81,23 @@ pub struct ScheduleStep {
 pub enum ScheduleEvent {
     /// A choice other than the first one that was possible.
     Switch(Switch),
-    /// A task has read or set a special variable of the program that it has not bound.
+    /// A task goes on at a point before an action that others can see: a signal, a wait, a change of facts.
+    Step(StandingTask),
+    /// A task goes on to its end.
+    End(StandingTask),
+    /// A task has read or set a place that others may reach: a special variable of the program that it has
+    /// not bound, or a part of an object.
     Use {
         /// Name of the task in reports.
         task: String,
-        /// Name of the variable.
-        variable: String,
-        /// The value, as a short text.
+        /// Name of the place: of a variable, or a part of an object.
+        target: String,
+        /// The value, as a short text; empty if it is not known.
         value: String,
-        /// Whether the variable was set.
+        /// Whether the place was set.
         is_set: bool,
+        /// Where the program stands, as `file:line:column`, if it was compiled with points.
+        place: Option<String>,
     },
 }
 
@@ -110,8 +122,67 @@ impl StandingTask {
     }
 }
 
-/// Tells of the uses of the program's variables since the last point.
+/// Tells of the point at which a task stands that goes on.
+pub(super) fn tell_step(vm: &Vm, index: TaskIndex, told: &mut TellStep<'_>) {
+    let Some(task) = vm.scheduler.tasks.at(index).filter(|task| task.flags.at_point()) else { return };
+    let standing = StandingTask::of(vm, index);
+    let event = if task.control.is_unwinding() {
+        ScheduleEvent::End(standing)
+    } else if standing.place.is_none() || stands_before_use(vm, task) {
+        return;
+    } else {
+        ScheduleEvent::Step(standing)
+    };
+    told(ScheduleStep { time: vm.scheduler.clock.now, event });
+}
+
+/// Returns whether a task stands at an instruction `point`, which says nothing by itself.
+fn stands_before_use(vm: &Vm, task: &Task) -> bool {
+    let word = Frames::of_task(task).next().and_then(|frame| {
+        let words = vm.heap.code_words(vm.heap.function_code(frame.function)?)?;
+        words.get(frame.word).copied()
+    });
+    word.is_some_and(|word| Word(word).opcode() == Some(Opcode::Point))
+}
+
+/// Returns the name of a place that is a part of an object.
+fn part_name(vm: &mut Vm, object: Value, part: &str) -> String {
+    let known = |name: &str, vm: &Vm| vm.scheduler.points.objects.iter().any(|(_, other)| other == name);
+    let is_box = vm.heap.is(object, Kind::Box);
+    let named = vm.scheduler.points.objects.iter().find(|(other, _)| *other == object);
+    let name = match named {
+        Some((_, name)) => name.clone(),
+        None => {
+            let noun = match vm.heap.kind(object) {
+                None => "pair".into(),
+                Some(Kind::Symbol) => describe(&vm.heap, object),
+                Some(Kind::Box) => part.to_owned(),
+                Some(Kind::String) => "string".into(),
+                Some(Kind::SimpleVector) => "vector".into(),
+                Some(Kind::HashTable) => "table".into(),
+                Some(Kind::Structure) => {
+                    let class = vm.heap.structure_class(object).unwrap_or(Value::NIL);
+                    describe(&vm.heap, class::name_of(&vm.heap, class))
+                }
+                Some(_) => "array".into(),
+            };
+            let is_whole = is_box || vm.heap.is(object, Kind::Symbol);
+            let mut name = if is_whole { noun.clone() } else { format!("{noun} 1") };
+            let mut number = 1;
+            while known(&name, vm) {
+                number += 1;
+                name = format!("{noun} {number}");
+            }
+            vm.scheduler.points.objects.push((object, name.clone()));
+            name
+        }
+    };
+    if is_box { name } else { format!("{part} of {name}") }
+}
+
+/// Tells of the uses of places since the last point.
 pub(super) fn tell_uses(vm: &mut Vm, told: &mut TellStep<'_>) {
+    vm.scheduler.points.place = None;
     let uses = vm.scheduler.points.uses.as_mut().map(std::mem::take).unwrap_or_default();
     if uses.is_empty() {
         return;
@@ -120,18 +191,23 @@ pub(super) fn tell_uses(vm: &mut Vm, told: &mut TellStep<'_>) {
     vm.names.each_symbol(&mut |symbol, object| {
         for (used, is_of_program) in uses.iter().zip(&mut is_of_program) {
             // Names that begin with `%` are those of the library's machinery, such as the object of a fluent.
-            *is_of_program |=
-                used.symbol == object && !is_of_library(symbol) && !symbol.name().starts_with('%');
+            *is_of_program |= used.target == UsedPlace::Variable(object)
+                && !is_of_library(symbol)
+                && !symbol.name().starts_with('%');
         }
     });
-    for (VariableUse { task, symbol, value, is_set }, is_of_program) in uses.into_iter().zip(is_of_program) {
-        if is_of_program {
-            let object = vm.scheduler.tasks.iter().find(|other| other.number == task);
-            let object = object.map_or(Value::NIL, |task| task.object);
-            let (task, variable) = (task_label(vm, object), describe(&vm.heap, symbol));
-            let event = ScheduleEvent::Use { task, variable, value, is_set };
-            told(ScheduleStep { time: vm.scheduler.clock.now, event });
-        }
+    for (PlaceUse { task, target, value, is_set, place }, is_of_program) in
+        uses.into_iter().zip(is_of_program)
+    {
+        let target = match target {
+            UsedPlace::Variable(symbol) if is_of_program => describe(&vm.heap, symbol),
+            UsedPlace::Variable(_) => continue,
+            UsedPlace::Part { object, part } => part_name(vm, object, &part),
+        };
+        let object = vm.scheduler.tasks.iter().find(|other| other.number == task);
+        let object = object.map_or(Value::NIL, |task| task.object);
+        let event = ScheduleEvent::Use { task: task_label(vm, object), target, value, is_set, place };
+        told(ScheduleStep { time: vm.scheduler.clock.now, event });
     }
 }
 

@@ -46,6 +46,7 @@ mod in_window;
 mod interrupt;
 #[cfg(feature = "native")]
 mod native;
+mod point;
 mod reserve;
 pub(crate) mod start;
 pub(crate) mod stubs;
@@ -1572,6 +1573,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
 
                 // ---- counting
                 LoopOperation::Pass => slow!(Pass),
+                LoopOperation::Point => slow!(Point),
 
                 // ---- stubs
                 LoopOperation::ErrorReturn | LoopOperation::InterruptReturn => {

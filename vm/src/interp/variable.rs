@@ -7,7 +7,7 @@ use super::{Signal, code_of, constant, failure, word_at};
 use crate::describe::describe;
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::{Exit, Raised};
-use crate::schedule::VariableUse;
+use crate::schedule::{PlaceUse, UsedPlace};
 use crate::shape::{CodeKind, Shape};
 use crate::task::{Binding, TaskNumber};
 use crate::value::Value;
@@ -170,8 +170,9 @@ impl Vm {
     pub(crate) fn tell_use(&mut self, symbol: Value, value: Value, is_set: bool) {
         let task = self.scheduler.running.as_ref().map_or(TaskNumber::NONE, |task| task.number);
         let value = if value == Value::UNBOUND { "unbound".into() } else { describe(&self.heap, value) };
+        let place = self.scheduler.points.place.take();
         if let Some(uses) = &mut self.scheduler.points.uses {
-            uses.push(VariableUse { task, symbol, value, is_set });
+            uses.push(PlaceUse { task, target: UsedPlace::Variable(symbol), value, is_set, place });
         }
     }
 

@@ -44,17 +44,28 @@ impl Grain {
     }
 }
 
-/// A use of a special variable by a task that has not bound it.
+/// A place that tasks may share.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct VariableUse {
+pub(crate) enum UsedPlace {
+    /// A special variable that the task has not bound.
+    Variable(Value),
+    /// A part of an object, by name. The object may be gone by now.
+    Part { object: Value, part: String },
+}
+
+/// A use of a place by a task.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct PlaceUse {
     /// The task.
     pub(crate) task: TaskNumber,
-    /// The variable, a symbol.
-    pub(crate) symbol: Value,
-    /// The value that was read or set, as a short text.
+    /// The used place.
+    pub(crate) target: UsedPlace,
+    /// The value that was read or set, as a short text; empty if it is not known.
     pub(crate) value: String,
-    /// Whether the variable was set.
+    /// Whether the place was changed.
     pub(crate) is_set: bool,
+    /// Where the program stands, as `file:line:column`.
+    pub(crate) place: Option<String>,
 }
 
 /// Where tasks stop while schedules are explored.
@@ -73,8 +84,14 @@ pub(crate) struct Points {
     pub(crate) asked: Option<usize>,
     /// The alternative that was chosen for it.
     pub(crate) chosen: Option<usize>,
-    /// The uses of special variables, oldest first; `None` unless a schedule is told.
-    pub(crate) uses: Option<Vec<VariableUse>>,
+    /// Whether tasks stop before uses of places that others may reach.
+    pub(crate) is_strict: bool,
+    /// The uses of places, oldest first; `None` unless a schedule is told.
+    pub(crate) uses: Option<Vec<PlaceUse>>,
+    /// Where the program stands that is about to use a special variable.
+    pub(crate) place: Option<String>,
+    /// The objects of the uses so far, with their names. They may be gone by now.
+    pub(crate) objects: Vec<(Value, String)>,
 }
 
 impl Points {
@@ -94,6 +111,14 @@ impl Scheduler {
     #[inline]
     pub(crate) fn point(&mut self) -> Result<(), Exit> {
         if self.points.grain.is_some() && self.stops_here() { Err(Exit::Again) } else { Ok(()) }
+    }
+
+    /// Stops the running task, in a strict exploration, before it uses a place that others may reach.
+    ///
+    /// # Errors
+    /// As [`Scheduler::point`].
+    pub(crate) fn point_of_use(&mut self) -> Result<(), Exit> {
+        if self.points.is_strict && self.stops_here() { Err(Exit::Again) } else { Ok(()) }
     }
 
     /// Stops the running task at a point before it looks at what other tasks have done.

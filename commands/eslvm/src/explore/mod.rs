@@ -1,8 +1,7 @@
 //! `eslvm explore`: runs a program under all schedules, and tells of those that end badly.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
 
-mod tell;
-
+use std::cell::{OnceCell, RefCell};
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -15,8 +14,9 @@ use esl::program::Schedule;
 use esl::program::{Ended, Program};
 use esl_command::{FAILED, NOT_PROVED, SUCCESS, StatusLine, USAGE, complain};
 use esl_testing::explore::{
-    Behaviour, Exploration, ExplorationScope, Grain, Livelock, Prepare, ScheduleEvent, SearchLimit,
-    SearchProgress, Settings, SourceForms, TimerGrain, explore_together, grains, tell_steps,
+    Behaviour, Exploration, ExplorationScope, ExploredEnding, Grain, Livelock, Prepare, RandomSettings,
+    ScheduleEvent, ScheduleStep, SearchLimit, SearchProgress, Settings, SourceForms, TimerGrain,
+    explore_together, grains, shortest, tell_steps,
 };
 use esl_timeline::Timeline;
 use esl_vm::vm::Vm;
@@ -26,6 +26,10 @@ use serde_json::json;
 macro_rules! say {
     ($($part:tt)*) => { _ = writeln!(std::io::stdout(), $($part)*) };
 }
+
+mod random;
+mod strict;
+mod tell;
 
 /// How to explore, and what to say of it.
 #[derive(Clone, Debug)]
@@ -40,6 +44,12 @@ pub struct ExplorationOptions {
     pub time: Duration,
     /// File for a timeline of the first finding.
     pub timeline: Option<PathBuf>,
+    /// Whether uses of shared places that are safe by chance only are looked for, too.
+    pub strict: bool,
+    /// Whether these are an error.
+    pub deny_fragile: bool,
+    /// The random schedules to try in place of all.
+    pub random: Option<RandomSettings>,
     /// Whether findings are written as JSON, one object a line.
     pub json: bool,
     /// Whether a terminal is not to be told how far the search is.
@@ -59,39 +69,137 @@ struct Finding {
     errors: String,
 }
 
-/// Explores a program, and prints what was found. Returns the exit status: 0 if no schedule ends badly, 1 if
-/// one does, 7 if none was found and there may be one.
-pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &ExplorationOptions) -> u8 {
+/// Explores a program, and prints what was found. `with_points` compiles the program with points before the
+/// uses of places that tasks may share, if its source is there. Returns the exit status: 0 if no schedule
+/// ends badly, 1 if one does, 7 if none was found and there may be one.
+pub fn run(
+    program: &Program,
+    with_points: &dyn Fn() -> Option<Program>,
+    file: &Path,
+    path: &ModulePath,
+    options: &ExplorationOptions,
+) -> u8 {
     let prepare = |machine: &mut Vm| esl::program::set_module_path(machine, path);
-    let started = Instant::now();
-    let grains = grains(program, options.grain);
-    let mut tried = Vec::new();
-    let (settings, scope, found, findings) = loop {
-        let settings = Settings { grain: grains[tried.len()], ..options.settings };
-        let found = match search(program, options, &settings, &prepare, started) {
-            Ok(found) => found,
-            Err(error) => {
-                complain(error);
-                return USAGE;
-            }
-        };
-        let scope = ExplorationScope::new(program, &settings, &found);
-        let findings = findings(&found);
-        let is_last = tried.len() + 1 == grains.len();
-        if is_last || !findings.is_empty() || found.limit.is_some() {
-            break (settings, scope, found, findings);
-        }
-        tried.push(scope);
+    let session = Session {
+        program,
+        with_points,
+        marked: OnceCell::new(),
+        file,
+        prepare: &prepare,
+        options,
+        started: Instant::now(),
+        forms: RefCell::default(),
     };
-    let mut forms = SourceForms::default();
-    for (finding, number) in findings.iter().zip(1..) {
-        let told = tell(program, file, &prepare, (options, &settings), finding, number, &mut forms);
-        if let Err(error) = told {
-            complain(error);
-            return USAGE;
+    let status = match options.random {
+        Some(random) => session.try_random(random),
+        None => session.try_all(),
+    };
+    status.unwrap_or_else(|error| {
+        complain(error);
+        USAGE
+    })
+}
+
+/// An exploration of a program by the command.
+struct Session<'a> {
+    program: &'a Program,
+    with_points: &'a dyn Fn() -> Option<Program>,
+    /// The program with points, once it was needed.
+    marked: OnceCell<Option<Program>>,
+    file: &'a Path,
+    prepare: Prepare<'a>,
+    options: &'a ExplorationOptions,
+    started: Instant,
+    forms: RefCell<SourceForms>,
+}
+
+/// The outcome of the searches at one grain after the other.
+struct Searched {
+    settings: Settings,
+    scope: ExplorationScope,
+    /// The scopes at coarser grains, at which nothing was found.
+    tried: Vec<ExplorationScope>,
+    found: Exploration<Behaviour>,
+    findings: Vec<Finding>,
+}
+
+impl Session<'_> {
+    /// Returns the program with points, if its source is there.
+    fn marked(&self) -> Option<&Program> {
+        self.marked.get_or_init(self.with_points).as_ref()
+    }
+
+    /// Tries all schedules. Returns the exit status.
+    ///
+    /// # Errors
+    /// [`TellError`].
+    fn try_all(&self) -> Result<u8, TellError> {
+        let searched = self.search_grains(self.program, false)?;
+        let Searched { settings, scope, tried, found, findings } = &searched;
+        for (finding, number) in findings.iter().zip(1..) {
+            self.tell((self.program, settings), finding, &format!("finding {number}"), number)?;
+        }
+        let (has_findings, is_complete) = (!findings.is_empty(), scope.is_complete());
+        if self.options.json {
+            self.say_figures(&searched);
+        } else {
+            print_summary(scope, tried, found.has_cycle, findings.len());
+        }
+        let is_fragile = self.options.strict && !has_findings && self.try_strictly()?;
+        Ok(match (has_findings, is_complete) {
+            (true, _) => FAILED,
+            _ if is_fragile && self.options.deny_fragile => FAILED,
+            (false, true) => SUCCESS,
+            (false, false) => NOT_PROVED,
+        })
+    }
+
+    /// Searches at one grain after the other, until something is found. `program` has points if it is
+    /// explored strictly.
+    ///
+    /// # Errors
+    /// [`TellError`].
+    fn search_grains(&self, program: &Program, strict: bool) -> Result<Searched, TellError> {
+        let grains = grains(self.program, self.options.grain);
+        let mut tried = Vec::new();
+        loop {
+            let grain = grains[tried.len()];
+            let settings = Settings { grain, strict, ..self.options.settings };
+            let found = self.search(program, &settings).map_err(TellError::Program)?;
+            let scope = ExplorationScope::new(self.program, &settings, &found);
+            let findings = findings(&found.endings, found.endless.as_ref(), found.livelock.as_ref());
+            let is_last = tried.len() + 1 == grains.len();
+            if is_last || !findings.is_empty() || found.limit.is_some() {
+                return Ok(Searched { settings, scope, tried, found, findings });
+            }
+            tried.push(scope);
         }
     }
-    if options.json {
+
+    /// Explores a program with these settings, and tells a terminal how far it is.
+    ///
+    /// # Errors
+    /// As [`explore_together`].
+    fn search(&self, program: &Program, settings: &Settings) -> Result<Exploration<Behaviour>, Error> {
+        let (options, started) = (self.options, self.started);
+        let line = Mutex::new(format!("exploring at grain {}", settings.grain.name()));
+        let search = || {
+            let mut told = started;
+            explore_together(program, settings, options.jobs, self.prepare, |progress| {
+                if told.elapsed() > Duration::from_millis(100) {
+                    told = Instant::now();
+                    *line.lock().unwrap_or_else(PoisonError::into_inner) = progress_line(progress, started);
+                }
+                started.elapsed() < options.time
+            })
+        };
+        let status_line = StatusLine::new(options.is_quiet);
+        status_line.during(|| line.lock().unwrap_or_else(PoisonError::into_inner).clone(), search)
+    }
+
+    /// Prints the figures of a search as JSON.
+    fn say_figures(&self, searched: &Searched) {
+        let Searched { scope, found, findings, .. } = searched;
         let limit = found.limit.map(|limit| match limit {
             SearchLimit::Asked => "time".into(),
             limit => format!("{limit:?}").to_lowercase(),
@@ -108,49 +216,94 @@ pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &Explorat
             "{}",
             json!({
                 "verdict": verdict, "grain": grain, "timers": timers, "unseen": unseen, "states": states,
-                "runs": runs, "findings": count, "limit": limit, "seconds": started.elapsed().as_secs_f64(),
+                "runs": runs, "findings": count, "limit": limit,
+                "seconds": self.started.elapsed().as_secs_f64(),
             })
         );
-    } else {
-        print_summary(&scope, &tried, found.has_cycle, findings.len());
     }
-    match (findings.is_empty(), scope.is_complete()) {
-        (false, _) => FAILED,
-        (true, true) => SUCCESS,
-        (true, false) => NOT_PROVED,
-    }
-}
 
-/// Explores a program with these settings, and tells a terminal how far it is.
-///
-/// # Errors
-/// As [`explore_together`].
-fn search(
-    program: &Program,
-    options: &ExplorationOptions,
-    settings: &Settings,
-    prepare: Prepare<'_>,
-    started: Instant,
-) -> Result<Exploration<Behaviour>, Error> {
-    let line = Mutex::new(format!("exploring at grain {}", settings.grain.name()));
-    let search = || {
-        let mut told = started;
-        explore_together(program, settings, options.jobs, prepare, |progress| {
-            if told.elapsed() > Duration::from_millis(100) {
-                told = Instant::now();
-                *line.lock().unwrap_or_else(PoisonError::into_inner) = progress_line(progress, started);
+    /// Writes the schedule of a finding, and prints the finding under a title. `program` is the one in which
+    /// it was found, with these settings. Returns the steps of the schedule.
+    ///
+    /// # Errors
+    /// [`TellError`].
+    fn tell(
+        &self,
+        (program, settings): (&Program, &Settings),
+        finding: &Finding,
+        title: &str,
+        number: usize,
+    ) -> Result<Vec<ScheduleStep>, TellError> {
+        let (options, forms) = (self.options, &mut *self.forms.borrow_mut());
+        let name = schedule_name(self.file, number);
+        let choices = match finding.ends {
+            true => {
+                shortest(program, settings, &finding.choices, self.prepare).map_err(TellError::Program)?
             }
-            started.elapsed() < options.time
-        })
-    };
-    let status_line = StatusLine::new(options.is_quiet);
-    status_line.during(|| line.lock().unwrap_or_else(PoisonError::into_inner).clone(), search)
+            false => finding.choices.clone(),
+        };
+        let schedule = Schedule::new(program, settings, choices.clone());
+        let written = std::fs::write(&name, schedule.to_string());
+        written.map_err(|error| TellError::Schedule(name.clone(), error))?;
+        let timeline = options.timeline.as_ref().filter(|_| number == 1);
+        let pictured = Mutex::new(None);
+        let prepare = |machine: &mut Vm| {
+            (self.prepare)(machine)?;
+            if let Some(path) = timeline {
+                let timeline = Timeline::begin(path, machine);
+                *pictured.lock().unwrap_or_else(PoisonError::into_inner) = Some(timeline);
+            }
+            Ok::<(), Error>(())
+        };
+        let mut steps = Vec::new();
+        // Points say where the uses of places are; only a strict exploration stops at them.
+        let told = self.marked().unwrap_or(program);
+        tell_steps(told, settings, &choices, finding.ends, &prepare, &mut |step| steps.push(step))
+            .map_err(TellError::Program)?;
+        if let Some(timeline) = pictured.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            let told = timeline.and_then(Timeline::complete);
+            told.map_err(TellError::Timeline)?;
+        }
+        if options.json {
+            let switches = steps.iter().filter_map(|step| match &step.event {
+                ScheduleEvent::Switch(switch) => Some(tell::text(switch, forms)),
+                _ => None,
+            });
+            let switches: Vec<String> = switches.collect();
+            let (what, errors, repeated) = (&finding.what, &finding.errors, finding.repeated);
+            let told = tell::json(&steps, forms);
+            let kind = title.split(' ').next().unwrap_or("finding");
+            say!(
+                "{}",
+                json!({
+                    kind: what, "grain": settings.grain.name(), "timers": settings.timers.name(),
+                    "switches": switches, "steps": told, "repeated": repeated, "report": errors,
+                    "schedule": name,
+                })
+            );
+            return Ok(steps);
+        }
+        say!("{title}: {}", finding.what);
+        tell::lines(&steps, forms).iter().for_each(|line| say!("{line}"));
+        match finding.repeated {
+            0 => {}
+            1 => say!("  then the last switch again, and so on"),
+            repeated => say!("  then the last {repeated} switches again, and so on"),
+        }
+        finding.errors.lines().for_each(|line| say!("  {line}"));
+        say!("  again: eslvm run --schedule {name} {}\n", self.file.display());
+        Ok(steps)
+    }
 }
 
 /// Returns the ways in which runs end badly, the one with the fewest switches first.
-fn findings(found: &Exploration<Behaviour>) -> Vec<Finding> {
+fn findings(
+    endings: &[ExploredEnding<Behaviour>],
+    endless: Option<&Vec<u32>>,
+    livelock: Option<&Livelock>,
+) -> Vec<Finding> {
     let mut findings: Vec<Finding> = Vec::new();
-    for ending in &found.endings {
+    for ending in endings {
         let Behaviour { ended, errors, .. } = &ending.what;
         let what = match ended {
             Ended::Normally(0) => continue,
@@ -172,12 +325,12 @@ fn findings(found: &Exploration<Behaviour>) -> Vec<Finding> {
             });
         }
     }
-    if let Some(choices) = &found.endless {
+    if let Some(choices) = endless {
         let what = "from here on, the program never ends".into();
         let choices = choices.clone();
         findings.push(Finding { what, choices, ends: false, repeated: 0, errors: String::new() });
     }
-    if let Some(Livelock { choices, lap }) = &found.livelock {
+    if let Some(Livelock { choices, lap }) = livelock {
         let what = "tasks can go on for ever, though each has its turns".into();
         let repeated = choices[*lap..].iter().filter(|&&choice| choice > 0).count();
         let choices = choices.clone();
@@ -201,6 +354,8 @@ enum TellError {
     Program(Error),
     /// The timeline cannot be written.
     Timeline(io::Error),
+    /// The program is compiled without points.
+    NoSource,
 }
 
 impl fmt::Display for TellError {
@@ -209,73 +364,9 @@ impl fmt::Display for TellError {
             TellError::Schedule(name, error) => write!(f, "{name} cannot be written: {error}"),
             TellError::Program(error) => error.fmt(f),
             TellError::Timeline(error) => write!(f, "the timeline cannot be written: {error}"),
+            TellError::NoSource => f.write_str("--strict needs the source of the program"),
         }
     }
-}
-
-/// Writes the schedule of a finding, and prints the finding.
-///
-/// # Errors
-/// [`TellError`].
-fn tell(
-    program: &Program,
-    file: &Path,
-    prepare: Prepare<'_>,
-    (options, settings): (&ExplorationOptions, &Settings),
-    finding: &Finding,
-    number: usize,
-    forms: &mut SourceForms,
-) -> Result<(), TellError> {
-    let name = schedule_name(file, number);
-    let schedule = Schedule::new(program, settings, finding.choices.clone());
-    let written = std::fs::write(&name, schedule.to_string());
-    written.map_err(|error| TellError::Schedule(name.clone(), error))?;
-    let timeline = options.timeline.as_ref().filter(|_| number == 1);
-    let pictured = Mutex::new(None);
-    let prepare = |machine: &mut Vm| {
-        prepare(machine)?;
-        if let Some(path) = timeline {
-            let timeline = Timeline::begin(path, machine);
-            *pictured.lock().unwrap_or_else(PoisonError::into_inner) = Some(timeline);
-        }
-        Ok::<(), Error>(())
-    };
-    let mut steps = Vec::new();
-    tell_steps(program, settings, &finding.choices, finding.ends, &prepare, &mut |step| steps.push(step))
-        .map_err(TellError::Program)?;
-    if let Some(timeline) = pictured.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        let told = timeline.and_then(Timeline::complete);
-        told.map_err(TellError::Timeline)?;
-    }
-    let switches = steps.iter().filter_map(|step| match &step.event {
-        ScheduleEvent::Switch(switch) => Some(switch),
-        ScheduleEvent::Use { .. } => None,
-    });
-    if options.json {
-        let switches: Vec<_> = switches.map(|switch| tell::text(switch, forms)).collect();
-        let (what, errors, repeated) = (&finding.what, &finding.errors, finding.repeated);
-        let steps = tell::json(&steps, forms);
-        say!(
-            "{}",
-            json!({
-                "finding": what, "grain": settings.grain.name(), "timers": settings.timers.name(),
-                "switches": switches, "steps": steps, "repeated": repeated, "report": errors, "schedule": name,
-            })
-        );
-        return Ok(());
-    }
-    say!("finding {number}: {}", finding.what);
-    for line in tell::lines(&steps, forms) {
-        say!("  {}", line.replace('\n', "\n  "));
-    }
-    match (finding.repeated, switches.count()) {
-        (0, _) => {}
-        (1, number) => say!("  then {number} again, and so on"),
-        (repeated, number) => say!("  then {} to {number} again, and so on", number + 1 - repeated),
-    }
-    finding.errors.lines().for_each(|line| say!("  {line}"));
-    say!("  again: eslvm run --schedule {name} {}\n", file.display());
-    Ok(())
 }
 
 /// Prints the verdict, and in a line what was not tried. `tried` are the scopes at coarser grains, at which

@@ -1,75 +1,136 @@
-//! Findings in words: which tasks take turns where, and what they read and set between.
+//! Findings as tables: the tasks side by side, a line for each step that matters.
+//!
+//! A step matters if another order of it and a step of another task could make a difference: uses of places
+//! that several tasks use and one changes, signals, waits and changes of facts, and where a task had to stop.
+//! Uses of a place by one task alone, and of places that nobody changes, are left out.
 
 use std::collections::HashMap;
 
 use esl_testing::explore::{ScheduleEvent, ScheduleStep, SourceForms, StandingTask, Switch};
 use serde_json::{Value as Json, json};
 
-/// Uses of variables between two switches that are told; of more, the first and the last ones.
-const TOLD_USES: usize = 8;
+/// Lines of a table; of more, the first and the last ones are shown.
+const TOLD_ROWS: usize = 40;
 
-/// A use of a variable that matters: others use the variable too, and it is set.
+/// Characters of a cell, and of the last column.
+const CELL: usize = 44;
+
+/// A line of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct ToldUse<'a> {
+struct Row {
     time: u64,
-    task: &'a str,
-    variable: &'a str,
-    value: &'a str,
-    is_set: bool,
+    /// The task; empty for the passing of time.
+    task: String,
+    text: String,
+    place: Option<String>,
+    kind: RowKind,
 }
 
-/// A part of the account of a schedule: uses of variables, and switches in between.
-enum Told<'a> {
-    Switch(u64, &'a Switch),
-    Uses(Vec<ToldUse<'a>>),
-    /// So many uses are left out.
-    Left(usize),
+/// A kind of line, with what only JSON says of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum RowKind {
+    Use { target: String, value: String, is_set: bool },
+    Step,
+    Switch(Switch),
+    LeftOut(usize),
 }
 
-/// Returns the parts of a schedule that its account contains.
-fn told(steps: &[ScheduleStep]) -> Vec<Told<'_>> {
+/// Returns the name of a task in the head of a column.
+fn column_name(label: &str) -> String {
+    let name = label.strip_prefix("task ").or_else(|| label.strip_prefix("the "));
+    name.unwrap_or(label).to_owned()
+}
+
+/// Returns the lines of a schedule.
+fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Row> {
     let matters = uses_that_matter(steps);
-    let mut told = Vec::new();
-    let mut uses: Vec<ToldUse<'_>> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     for (step, matters) in steps.iter().zip(matters) {
-        match &step.event {
-            ScheduleEvent::Use { task, variable, value, is_set } => {
-                let used = ToldUse { time: step.time, task, variable, value, is_set: *is_set };
-                if matters && uses.last() != Some(&used) {
-                    uses.push(used);
-                }
+        let row = match &step.event {
+            ScheduleEvent::Use { task, target, value, is_set, place } => {
+                let text = match (is_set, value.is_empty()) {
+                    (true, false) => format!("sets {target} to {value}"),
+                    (true, true) => format!("changes {target}"),
+                    (false, false) => format!("reads {target} = {value}"),
+                    (false, true) => format!("reads {target}"),
+                };
+                let kind = RowKind::Use { target: target.clone(), value: value.clone(), is_set: *is_set };
+                Row { time: step.time, task: task.clone(), text, place: place.clone(), kind }
             }
-            ScheduleEvent::Switch(switch) => {
-                put_uses(&mut told, std::mem::take(&mut uses));
-                told.push(Told::Switch(step.time, switch));
+            ScheduleEvent::Step(StandingTask { label, place }) => {
+                let form = place.as_ref().and_then(|place| forms.text(place));
+                let text = form.unwrap_or_else(|| "goes on".into());
+                Row { time: step.time, task: label.clone(), text, place: place.clone(), kind: RowKind::Step }
             }
+            ScheduleEvent::End(_) => continue,
+            ScheduleEvent::Switch(switch) => match switch_row(step.time, switch) {
+                Some(row) => row,
+                None => continue,
+            },
+        };
+        // A task that does a step in parts stands at it several times.
+        let is_repeated = rows
+            .iter()
+            .rev()
+            .take_while(|other| other.task == row.task)
+            .any(|other| row.kind == RowKind::Step && other.kind == row.kind && other.place == row.place);
+        if matters && !is_repeated && rows.last() != Some(&row) {
+            rows.push(row);
         }
     }
-    put_uses(&mut told, uses);
-    told
+    shortened(rows)
 }
 
-fn put_uses<'a>(told: &mut Vec<Told<'a>>, mut uses: Vec<ToldUse<'a>>) {
-    if uses.len() > TOLD_USES {
-        let last = uses.split_off(uses.len() - TOLD_USES / 2);
-        let left = uses.split_off(TOLD_USES / 2).len();
-        told.extend([Told::Uses(uses), Told::Left(left), Told::Uses(last)]);
-    } else if !uses.is_empty() {
-        told.push(Told::Uses(uses));
+/// Returns the lines without those before other tasks come into play, and not too many.
+fn shortened(mut rows: Vec<Row>) -> Vec<Row> {
+    let first = rows.first().map(|row| row.task.clone()).unwrap_or_default();
+    let alone = rows.iter().take_while(|row| row.task == first).count();
+    if alone < rows.len() {
+        let mut at = 0;
+        rows.retain(|row| {
+            at += 1;
+            at > alone || row.kind != RowKind::Step
+        });
     }
+    if rows.len() > TOLD_ROWS {
+        let last = rows.split_off(rows.len() - TOLD_ROWS / 2);
+        let left = rows.split_off(TOLD_ROWS / 2).len();
+        let text = format!("… {left} more …");
+        let kind = RowKind::LeftOut(left);
+        rows.push(Row { time: last[0].time, task: String::new(), text, place: None, kind });
+        rows.extend(last);
+    }
+    rows
 }
 
-/// Returns of each step whether it is a use that matters: of a variable that several tasks use, of which one
+/// Returns the line of a choice; `None` if the order of the lines shows it.
+fn switch_row(time: u64, switch: &Switch) -> Option<Row> {
+    let (task, text) = match switch {
+        Switch::Preemption { stopped, .. } => (stopped, "has to stop before".to_owned()),
+        Switch::Order { .. } => return None,
+        Switch::Timer { passed, .. } => {
+            let text = format!("{} s pass, and timers end", seconds(*passed));
+            let kind = RowKind::Switch(switch.clone());
+            return Some(Row { time, task: String::new(), text, place: None, kind });
+        }
+        Switch::Choice { task, form } => (task, format!("chooses form {}", form + 1)),
+    };
+    let (label, place) = (task.label.clone(), task.place.clone());
+    Some(Row { time, task: label, text, place, kind: RowKind::Switch(switch.clone()) })
+}
+
+/// Returns of each step whether it matters; of uses, those of a place that several tasks use, of which one
 /// sets it, and not before the last value that its first user gives it alone.
 fn uses_that_matter(steps: &[ScheduleStep]) -> Vec<bool> {
-    let mut by_variable: HashMap<&str, Vec<(usize, &str, bool)>> = HashMap::new();
+    let mut by_target: HashMap<&str, Vec<(usize, &str, bool)>> = HashMap::new();
+    let mut matters = vec![true; steps.len()];
     for (at, step) in steps.iter().enumerate() {
-        if let ScheduleEvent::Use { task, variable, is_set, .. } = &step.event {
-            by_variable.entry(variable).or_default().push((at, task, *is_set));
+        if let ScheduleEvent::Use { task, target, is_set, .. } = &step.event {
+            by_target.entry(target).or_default().push((at, task, *is_set));
+            matters[at] = false;
         }
     }
-    let mut matters = vec![false; steps.len()];
-    for uses in by_variable.values() {
+    for uses in by_target.values() {
         let first = uses[0].1;
         let alone = uses.iter().take_while(|(_, task, _)| *task == first).count();
         let begin = uses[..alone].iter().rposition(|(.., is_set)| *is_set).map_or(0, |last| last + 1);
@@ -82,45 +143,76 @@ fn uses_that_matter(steps: &[ScheduleStep]) -> Vec<bool> {
     matters
 }
 
-/// Returns a schedule as lines: the numbered switches, and what tasks read and set between them.
+/// Returns a text with at most so many characters.
+fn cut(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}…", text[..end].trim_end()),
+        None => text.to_owned(),
+    }
+}
+
+/// Returns a schedule as the lines of a table.
 pub(super) fn lines(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<String> {
-    let mut lines = Vec::new();
-    let mut number = 0;
-    for told in told(steps) {
-        match told {
-            Told::Switch(time, switch) => {
-                number += 1;
-                let time = if time == 0 { String::new() } else { format!("at {} s, ", seconds(time)) };
-                lines.push(format!("{number}. {time}{}", text(switch, forms).replace('\n', "\n   ")));
-            }
-            Told::Uses(uses) => {
-                lines.extend(uses.iter().map(|used| {
-                    let verb = if used.is_set { "sets" } else { "reads" };
-                    let sign = if used.is_set { "to" } else { "=" };
-                    format!("   {} {verb} {} {sign} {}", used.task, used.variable, used.value)
-                }));
-            }
-            Told::Left(count) => lines.push(format!("   … {count} more …")),
+    let rows = rows(steps, forms);
+    let mut tasks: Vec<&str> = Vec::new();
+    for row in rows.iter().filter(|row| !row.task.is_empty()) {
+        if !tasks.contains(&row.task.as_str()) {
+            tasks.push(&row.task);
         }
+    }
+    let length = |text: &str| text.chars().count();
+    let width = |task: &&str| {
+        let cells = rows.iter().filter(|row| row.task == *task).map(|row| length(&cut(&row.text, CELL)));
+        cells.max().unwrap_or(0).max(length(&column_name(task)))
+    };
+    let widths: Vec<usize> = tasks.iter().map(width).collect();
+    let pad = |text: &str, width: usize| format!("{text}{}", " ".repeat(width.saturating_sub(length(text))));
+    let line = |time: &str, cells: &[String], place: &str| {
+        let cells: Vec<String> = cells.iter().zip(&widths).map(|(cell, width)| pad(cell, *width)).collect();
+        format!("{time:>6}  {}  {place}", cells.join("  ")).trim_end().to_owned()
+    };
+    if tasks.is_empty() {
+        return rows.iter().map(|row| format!("{:>6}  {}", seconds(row.time), row.text)).collect();
+    }
+    let heads: Vec<String> = tasks.iter().map(|task| column_name(task)).collect();
+    let mut lines = vec![line("time", &heads, "place")];
+    for row in &rows {
+        let time = seconds(row.time).to_string();
+        if row.task.is_empty() {
+            lines.push(format!("{time:>6}  {}", row.text));
+            continue;
+        }
+        let cell = |task: &&str| if row.task == *task { cut(&row.text, CELL) } else { String::new() };
+        let cells: Vec<String> = tasks.iter().map(cell).collect();
+        let place = match (&row.place, &row.kind) {
+            (Some(place), RowKind::Step) => place.clone(),
+            (Some(place), _) => forms.describe(place),
+            (None, _) => String::new(),
+        };
+        lines.push(line(&time, &cells, &place));
     }
     lines
 }
 
-/// Returns a schedule as JSON: an array of switches and uses of variables.
+/// Returns a schedule as JSON: an array of the lines of its table.
 pub(super) fn json(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Json> {
-    let mut items = Vec::new();
-    for told in told(steps) {
-        match told {
-            Told::Switch(time, switch) => items.push(switch_json(seconds(time), switch, forms)),
-            Told::Uses(uses) => items.extend(uses.iter().map(|used| {
-                let kind = if used.is_set { "set" } else { "read" };
-                let ToldUse { task, variable, value, .. } = used;
-                json!({ "kind": kind, "time": seconds(used.time), "task": task, "variable": variable, "value": value })
-            })),
-            Told::Left(count) => items.push(json!({ "kind": "left-out", "count": count })),
+    let rows = rows(steps, forms);
+    let item = |row: &Row| {
+        let form = row.place.as_ref().and_then(|place| forms.text(place));
+        let (time, task, place) = (seconds(row.time), &row.task, &row.place);
+        match &row.kind {
+            RowKind::Use { target, value, is_set } => json!({
+                "kind": if *is_set { "set" } else { "read" }, "time": time, "task": task, "variable": target,
+                "value": value, "place": place, "form": form,
+            }),
+            RowKind::Step => {
+                json!({ "kind": "step", "time": time, "task": task, "place": place, "form": form })
+            }
+            RowKind::Switch(switch) => switch_json(time, switch, forms),
+            RowKind::LeftOut(count) => json!({ "kind": "left-out", "count": count }),
         }
-    }
-    items
+    };
+    rows.iter().map(item).collect()
 }
 
 fn seconds(time: u64) -> f64 {
@@ -176,19 +268,56 @@ pub(super) fn text(switch: &Switch, forms: &mut SourceForms) -> String {
     }
 }
 
+/// Returns the two places between which a task had to stop in a schedule: where it last used a place that
+/// another task used meanwhile, and before which use it stopped; with the name of the place. The task is the
+/// last one that stopped so.
+pub(super) fn fragile_places(steps: &[ScheduleStep]) -> Option<FragilePlaces> {
+    let stops = steps.iter().enumerate().rev().filter_map(|(at, step)| match &step.event {
+        ScheduleEvent::Switch(Switch::Preemption { stopped, .. }) => Some((at, stopped)),
+        _ => None,
+    });
+    stops.into_iter().find_map(|(at, stopped)| {
+        let before = steps[..at].iter().rev().find_map(|step| match &step.event {
+            ScheduleEvent::Use { task, target, place: Some(place), .. } if *task == stopped.label => {
+                Some((target, place))
+            }
+            _ => None,
+        });
+        let (target, first) = before?;
+        let is_used = |event: &ScheduleEvent| match event {
+            ScheduleEvent::Use { task, target: other, .. } => *task != stopped.label && target == other,
+            _ => false,
+        };
+        steps[at..].iter().any(|step| is_used(&step.event)).then(|| FragilePlaces {
+            target: target.clone(),
+            first: first.clone(),
+            second: stopped.place.clone().unwrap_or_default(),
+        })
+    })
+}
+
+/// Two places of the program that belong together, and the place that is used there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct FragilePlaces {
+    pub(super) target: String,
+    pub(super) first: String,
+    pub(super) second: String,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Returns the uses that are told of a schedule in which tasks use variables, in the form `A:x=1` or
-    /// `A:x?1`.
-    fn told_uses(uses: &[&str]) -> Vec<String> {
+    /// Returns the table of a schedule in which tasks use variables, in the form `A:x=1` or `A:x?1`, without
+    /// spaces at the beginning of lines.
+    fn table(uses: &[&str]) -> Vec<String> {
         let step = |text: &&str| {
             let (task, rest) = text.split_once(':').expect("a task comes first");
             let is_set = rest.contains('=');
-            let (variable, value) = rest.split_once(['=', '?']).expect("a value comes last");
-            let (task, variable, value) = (task.into(), variable.into(), value.into());
-            ScheduleStep { time: 0, event: ScheduleEvent::Use { task, variable, value, is_set } }
+            let (target, value) = rest.split_once(['=', '?']).expect("a value comes last");
+            let (task, target, value) = (task.into(), target.into(), value.into());
+            let event = ScheduleEvent::Use { task, target, value, is_set, place: None };
+            ScheduleStep { time: 0, event }
         };
         let steps: Vec<ScheduleStep> = uses.iter().map(step).collect();
         let mut lines = lines(&steps, &mut SourceForms::default());
@@ -197,20 +326,31 @@ mod tests {
     }
 
     #[test]
-    fn uses_are_told_that_others_can_see() {
+    fn tasks_stand_side_by_side() {
         assert_eq!(
-            told_uses(&["M:n=0", "A:n?0", "B:n?0", "B:n=1", "A:n=1"]),
-            ["A reads n = 0", "B reads n = 0", "B sets n to 1", "A sets n to 1"]
+            table(&["M:n=0", "A:n?0", "B:n?0", "B:n=1", "A:n=1"]),
+            [
+                "time  A            B            place",
+                "0  reads n = 0",
+                "0               reads n = 0",
+                "0               sets n to 1",
+                "0  sets n to 1",
+            ]
         );
+    }
+
+    #[test]
+    fn uses_are_told_that_others_can_see() {
         // Variables that are set once and only read from then on, and those that one task uses alone, are
         // left out.
-        assert!(told_uses(&["M:n=0", "A:n?0", "B:n?0", "A:m=1", "A:m?1"]).is_empty());
+        assert!(table(&["M:n=0", "A:n?0", "B:n?0", "A:m=1", "A:m?1"]).is_empty());
         // A read before the others set.
-        assert_eq!(told_uses(&["A:n?0", "A:n?0", "B:n=1"]), ["A reads n = 0", "B sets n to 1"]);
+        let lines = table(&["A:n?0", "A:n?0", "B:n=1"]);
+        assert_eq!(lines[1..], ["0  reads n = 0", "0               sets n to 1"]);
         let many: Vec<String> =
-            (0..20).map(|n| format!("{}:n={n}", if n % 2 == 0 { "A" } else { "B" })).collect();
+            (0..90).map(|n| format!("{}:n={n}", if n % 2 == 0 { "A" } else { "B" })).collect();
         let many: Vec<&str> = many.iter().map(String::as_str).collect();
-        let told = told_uses(&many);
-        assert_eq!((told.len(), &*told[4]), (9, "… 11 more …"));
+        let told = table(&many);
+        assert_eq!((told.len(), &*told[21]), (42, "0  … 49 more …"));
     }
 }

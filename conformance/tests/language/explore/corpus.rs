@@ -10,7 +10,7 @@ use esl_testing::explore::{ExplorationScope, Grain, Settings, explore, grains};
 use super::{compile, outputs};
 
 /// Returns the programs whose names end in this, in the order of their names.
-fn programs(ending: &str) -> Vec<(PathBuf, String)> {
+pub(super) fn programs(ending: &str) -> Vec<(PathBuf, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("schedules");
     let files = std::fs::read_dir(folder).expect("the folder can be read");
     let mut files: Vec<PathBuf> = files.map(|file| file.expect("it has a name").path()).collect();

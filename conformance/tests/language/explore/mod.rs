@@ -9,7 +9,9 @@ mod keeping;
 mod oracle;
 mod origins;
 mod putting_back;
+mod random;
 mod resources;
+mod strict;
 mod suspension;
 mod variables;
 

@@ -11,7 +11,7 @@ use esl_native::NativeContext;
 use esl_native::abi::{STEP_JUMP, STEP_NEXT, STEP_SIGNAL, STEP_VALUES};
 
 use super::super::{
-    Signal, aux_at, code_of, cold, constants_of, double, substitute, unwind, variable, word_at,
+    Signal, aux_at, code_of, cold, constants_of, double, point, substitute, unwind, variable, word_at,
 };
 use super::{Caller, make_words};
 use crate::heap::Phase;

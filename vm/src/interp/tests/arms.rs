@@ -434,6 +434,7 @@ const PROGRAMS: &[(&str, &str)] = &[
     ),
     ("push-handler-case r1.. k12 L \n load-int r1 1 \n pop-control 1 \n return r1 \n L: return r2", "1"),
     ("pass 16777215 \n load-int r0 1 \n pass 0 \n return r0", "1"),
+    ("point \n load-int r0 1 \n return r0", "1"),
     (
         "push-failure-cleanup r1.. L \n load-int r1 1 \n pop-control 1 \n return r1
          L: end-cleanup \n values-to-list r1 \n return r1",

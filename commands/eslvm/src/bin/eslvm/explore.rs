@@ -28,10 +28,12 @@ pub(crate) fn run_explore(
         command::refuse_overwriting(timeline, [file])?;
     }
     let path = ModulePath::new([file], library);
+    let mut read = None;
     let program = match command::read_program(file)? {
         ProgramFile::Compiled(program) => program,
         ProgramFile::Source(source) => {
-            let compile = || program::compile_with(&[source], &path, Modules::Inside);
+            let source = &*read.insert(source);
+            let compile = || program::compile_with(std::slice::from_ref(source), &path, Modules::Inside);
             let compiled = compiling(file, is_quiet, compile);
             let color = command::wants_color();
             command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
@@ -56,13 +58,31 @@ pub(crate) fn run_explore(
         output: false,
         ..explore::Settings::default()
     };
+    let with_points = || {
+        let source = read.as_ref()?;
+        program::compile_with_points(std::slice::from_ref(source), &path).program
+    };
     let time = std::time::Duration::from_secs(u64::from(options.time));
     let (timeline, json) = (options.timeline.clone(), options.json);
     let jobs = options.jobs.map_or_else(processors, usize::from);
-    Ok(run(
-        &program,
-        file,
-        &path,
-        &ExplorationOptions { settings, grain, jobs, time, timeline, json, is_quiet },
-    ))
+    let random = options.random.map(|count| explore::RandomSettings {
+        count,
+        seed: options.seed.unwrap_or(1),
+        depth: options.depth,
+        jobs,
+    });
+    let (strict, deny_fragile) = (options.strict || !options.deny.is_empty(), !options.deny.is_empty());
+    let options = ExplorationOptions {
+        settings,
+        grain,
+        jobs,
+        time,
+        timeline,
+        strict,
+        deny_fragile,
+        random,
+        json,
+        is_quiet,
+    };
+    Ok(run(&program, &with_points, file, &path, &options))
 }

@@ -356,6 +356,23 @@ pub(crate) struct ExploreArguments {
     /// Most switches of a schedule: points at which a task that could go on lets another one go first
     #[arg(long, value_name = "N")]
     pub(crate) switches: Option<usize>,
+    /// Also look for updates that are safe only because no call stands between a read and a write: fragile
+    /// ones
+    #[arg(long, conflicts_with = "random")]
+    pub(crate) strict: bool,
+    /// End with status 1 if an update is fragile; implies --strict
+    #[arg(long, value_name = "WHAT", value_parser = ["fragile"], conflicts_with = "random")]
+    pub(crate) deny: Vec<String>,
+    /// Try N schedules with random priorities, in place of all schedules
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) random: Option<u64>,
+    /// Seed of the first random schedule, by default 1; the next schedules have the next seeds
+    #[arg(long, value_name = "SEED", requires = "random")]
+    pub(crate) seed: Option<u64>,
+    /// Number of steps whose order matters in the faults that random schedules look for
+    #[arg(long, value_name = "D", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(requires = "random")]
+    pub(crate) depth: u32,
     /// Most times that CHOOSE takes another form than its first
     #[arg(long, value_name = "N")]
     pub(crate) faults: Option<usize>,

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use esl::host::ProcessSignal;
 use esl::module_path::ModulePath;
-use esl::program::{self, Compiled, Ended, Program};
+use esl::program::{self, Compiled, Ended, Instrumentation, Program};
 use esl_command as command;
-use esl_command::{NOT_COMPILED, ProgramFile, complain};
+use esl_command::{NOT_COMPILED, ProgramFile, USAGE, complain};
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_testing::coverage::Coverage;
 use eslvm::signal::SignalTarget;
@@ -14,7 +14,7 @@ use eslvm::signal::SignalTarget;
 use crate::options::MachineOptions;
 
 /// Reads the program in a file, and compiles it if it is a source, within the limits of its run. Returns
-/// its coverage too, if that `is_covered`.
+/// its coverage too, if its passages are counted.
 ///
 /// # Errors
 /// The exit status, after a message.
@@ -22,18 +22,23 @@ pub(crate) fn program(
     file: &Path,
     path: &ModulePath,
     options: &MachineOptions,
-    is_covered: bool,
+    instrumentation: Instrumentation,
     is_quiet: bool,
     signals: &SignalTarget,
 ) -> Result<(Program, Option<Coverage>), u8> {
+    let is_covered = instrumentation == Instrumentation::Passages;
     let source = match command::read_program(file)? {
         ProgramFile::Compiled(_) if is_covered => return Err(command::refuse_compiled(file)),
+        ProgramFile::Compiled(_) if instrumentation == Instrumentation::Points => {
+            complain(format_args!("{} is compiled; a strict schedule needs its source", file.display()));
+            return Err(USAGE);
+        }
         ProgramFile::Compiled(program) => return Ok((program, None)),
         ProgramFile::Source(source) => source,
     };
     let mut watch = |inbox| signals.set(inbox);
     let config = options.config();
-    let compile = || program::compile_for_run(&[source], path, is_covered, &config, &mut watch);
+    let compile = || program::compile_for_run(&[source], path, instrumentation, &config, &mut watch);
     let compiled = compiling(file, is_quiet, compile);
     if let Some(ended) = compiled.stopped {
         match ended {

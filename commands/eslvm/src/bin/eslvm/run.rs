@@ -5,7 +5,7 @@ use std::path::Path;
 
 use esl::host::{Host, RealHost, RecordingHost};
 use esl::module_path::ModulePath;
-use esl::program::{self, Ended, Program, Schedule};
+use esl::program::{self, Ended, Instrumentation, Program, Schedule};
 use esl_command::{USAGE, complain, refuse_overwriting};
 use esl_replay::{FileRecorder, RunSetup};
 use esl_timeline::Timeline;
@@ -65,7 +65,12 @@ pub(crate) fn run(
     let signals = SignalTarget::default();
     end_on_signal(signals.clone());
     let is_covered = coverage.is_some() || stats == Some(Stats::Coverage);
-    let (program, mut covered) = program(file, path, options, is_covered, is_quiet, &signals)?;
+    let instrumentation = match schedule {
+        Some(schedule) if schedule.is_strict() => Instrumentation::Points,
+        _ if is_covered => Instrumentation::Passages,
+        _ => Instrumentation::None,
+    };
+    let (program, mut covered) = program(file, path, options, instrumentation, is_quiet, &signals)?;
     let setup = |error| {
         complain(error);
         USAGE
