@@ -85,12 +85,8 @@ unsafe fn note_use(vm: &mut Vm, pc: *const u32, base: *mut Value) {
     let elements =
         |vector: Value, index: usize| vm.heap.vector(vector).and_then(|items| items.get(index).copied());
     let slot = |instance: Value, index: usize, value: Option<Value>| {
-        let of_class = vm.heap.structure_class(instance).unwrap_or(Value::NIL);
-        let mut names = class::class_slot(&vm.heap, of_class, class::slot::SLOTS);
-        (0..index).for_each(|_| names = vm.heap.cdr(names).unwrap_or(Value::NIL));
-        let name = vm.heap.car(names).map_or("a slot".into(), |name| describe(&vm.heap, name));
         let value = value.or_else(|| vm.heap.structure_slots(instance)?.get(index).copied());
-        UsedPart { object: instance, part: name, value }
+        UsedPart { object: instance, part: slot_name(vm, instance, index), value }
     };
     let used = match instr {
         Instr::Car { list, .. } => part(get(list), "car", vm.heap.car(get(list))),
@@ -162,6 +158,14 @@ unsafe fn note_use(vm: &mut Vm, pc: *const u32, base: *mut Value) {
     }
 }
 
+/// Returns the name of a slot of an instance.
+fn slot_name(vm: &Vm, instance: Value, index: usize) -> String {
+    let of_class = vm.heap.structure_class(instance).unwrap_or(Value::NIL);
+    let mut names = class::class_slot(&vm.heap, of_class, class::slot::SLOTS);
+    (0..index).for_each(|_| names = vm.heap.cdr(names).unwrap_or(Value::NIL));
+    vm.heap.car(names).map_or("a slot".into(), |name| describe(&vm.heap, name))
+}
+
 /// Returns the part of an object that a builtin uses.
 fn part_used_by(vm: &Vm, builtin: Builtin, arguments: &[Value]) -> Option<UsedPart> {
     let sharing = builtin.sharing()?;
@@ -176,7 +180,13 @@ fn part_used_by(vm: &Vm, builtin: Builtin, arguments: &[Value]) -> Option<UsedPa
     let object = arguments.iter().find(is_used).copied()?;
     let text = |at: usize| arguments.get(at).map_or(String::new(), |&value| describe(heap, value));
     let last = arguments.last().copied();
+    let index = |at: usize| arguments.get(at).and_then(|index| index.as_index()).unwrap_or(0);
     let (part, value) = match builtin {
+        Builtin::SetCar | Builtin::Rplaca => ("car".into(), last),
+        Builtin::SetCdr | Builtin::Rplacd => ("cdr".into(), last),
+        Builtin::SlotOf => (slot_name(vm, object, index(1)), None),
+        Builtin::SetSlotOf => (slot_name(vm, object, index(1)), last),
+        Builtin::SetStructureRef => (slot_name(vm, object, index(1)), last),
         Builtin::Gethash | Builtin::Remhash => (format!("entry {}", text(0)), None),
         Builtin::Puthash => (format!("entry {}", text(0)), last),
         Builtin::AddToValue => (format!("entry {}", text(0)), None),

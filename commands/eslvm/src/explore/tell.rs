@@ -86,10 +86,14 @@ fn shortened(mut rows: Vec<Row>) -> Vec<Row> {
     let first = rows.first().map(|row| row.task.clone()).unwrap_or_default();
     let alone = rows.iter().take_while(|row| row.task == first).count();
     if alone < rows.len() {
+        // Nor what a task does that begins when the others have come to their ends.
+        let last = rows.last().map(|row| row.task.clone()).unwrap_or_default();
+        let until = rows.iter().rposition(|row| row.task != last).map_or(0, |at| at + 1);
+        let is_late = rows[..until].iter().all(|row| row.task != last);
         let mut at = 0;
         rows.retain(|row| {
             at += 1;
-            at > alone || row.kind != RowKind::Step
+            row.kind != RowKind::Step || at > alone && !(is_late && at > until)
         });
     }
     if rows.len() > TOLD_ROWS {
@@ -288,11 +292,15 @@ pub(super) fn fragile_places(steps: &[ScheduleStep]) -> Option<FragilePlaces> {
             ScheduleEvent::Use { task, target: other, .. } => *task != stopped.label && target == other,
             _ => false,
         };
-        steps[at..].iter().any(|step| is_used(&step.event)).then(|| FragilePlaces {
-            target: target.clone(),
-            first: first.clone(),
-            second: stopped.place.clone().unwrap_or_default(),
-        })
+        if !steps[at..].iter().any(|step| is_used(&step.event)) {
+            return None;
+        }
+        let after = steps[at..].iter().find_map(|step| match &step.event {
+            ScheduleEvent::Use { task, place: Some(place), .. } if *task == stopped.label => Some(place),
+            _ => None,
+        });
+        let second = after.or(stopped.place.as_ref())?.clone();
+        Some(FragilePlaces { target: target.clone(), first: first.clone(), second })
     })
 }
 

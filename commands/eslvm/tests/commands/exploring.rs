@@ -430,7 +430,7 @@ fn an_update_that_is_safe_by_chance_is_fragile() {
         "{output}"
     );
     assert!(output.contains("\nfragile 1: the program ends with status 9\n  time  "), "{output}");
-    let places = "    count.esl:3:13: (+ *n* 1)\n    count.esl:3:3: (setq *n* (+ *n* 1))\n";
+    let places = "    count.esl:3:16: *n*\n    count.esl:3:3: (setq *n* (+ *n* 1))\n";
     assert!(output.contains("  *N* is used at two places") && output.contains(places), "{output}");
     assert!(output.contains("\nfragile: findings: 1 (grain variables, "), "{output}");
     assert_eq!(run(&folder, &["run", "--schedule", "count-1.schedule", "count.esl"]).0, Some(9));
