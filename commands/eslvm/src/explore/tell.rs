@@ -89,7 +89,7 @@ fn shortened(mut rows: Vec<Row>) -> Vec<Row> {
         // Nor what a task does that begins when the others have come to their ends.
         let last = rows.last().map(|row| row.task.clone()).unwrap_or_default();
         let until = rows.iter().rposition(|row| row.task != last).map_or(0, |at| at + 1);
-        let is_late = rows[..until].iter().all(|row| row.task != last);
+        let is_late = rows[alone.min(until)..until].iter().all(|row| row.task != last);
         let mut at = 0;
         rows.retain(|row| {
             at += 1;
