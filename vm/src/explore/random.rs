@@ -54,9 +54,9 @@ const MOST_STEPS: u64 = 2_000_000;
 const TIMER: TaskNumber = TaskNumber(u64::MAX - 1);
 
 /// A source of numbers that are spread evenly (Steele, Lea and Flood 2014, `splitmix64`).
-struct Numbers(u64);
+struct EvenNumbers(u64);
 
-impl Numbers {
+impl EvenNumbers {
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -71,7 +71,7 @@ impl Numbers {
 
 /// The priorities of the tasks of a run.
 struct Priorities {
-    numbers: Numbers,
+    numbers: EvenNumbers,
     /// Priorities by task. Those below [`Priorities::LOWERED`] were given at a change, the earliest change
     /// the highest.
     of: HashMap<TaskNumber, u64>,
@@ -87,7 +87,7 @@ impl Priorities {
     const LOWERED: u64 = 1 << 32;
 
     fn new(schedule: RandomSchedule) -> Priorities {
-        let mut numbers = Numbers(schedule.seed);
+        let mut numbers = EvenNumbers(schedule.seed);
         let changes = (1..schedule.depth).map(|_| 1 + numbers.below(schedule.steps)).collect();
         let fair_after = schedule.steps.saturating_mul(FAIR_AFTER.0).max(FAIR_AFTER.1);
         Priorities { numbers, of: HashMap::new(), changes, changed: 0, fair_after }

@@ -9,7 +9,7 @@ use crate::heap::Kind;
 use crate::interp::frames::Frames;
 use crate::names::class;
 use crate::report::{program_place, task_label};
-use crate::schedule::{PlaceUse, UsedPlace};
+use crate::schedule::{SharedUse, UsedPlace};
 use crate::task::{Task, TaskIndex};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -196,7 +196,7 @@ pub(super) fn tell_uses(vm: &mut Vm, told: &mut TellStep<'_>) {
                 && !symbol.name().starts_with('%');
         }
     });
-    for (PlaceUse { task, target, value, is_set, place }, is_of_program) in
+    for (SharedUse { task, target, value, is_set, place }, is_of_program) in
         uses.into_iter().zip(is_of_program)
     {
         let target = match target {

@@ -11,7 +11,7 @@ use super::{Signal, aux_at, word_at};
 use crate::describe::describe;
 use crate::heap::Kind;
 use crate::names::class;
-use crate::schedule::{PlaceUse, UsedPlace};
+use crate::schedule::{SharedUse, UsedPlace};
 use crate::task::TaskNumber;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -152,7 +152,7 @@ unsafe fn note_use(vm: &mut Vm, pc: *const u32, base: *mut Value) {
     let value = used.value.map_or(String::new(), |value| describe(&vm.heap, value));
     let task = vm.scheduler.running.as_ref().map_or(TaskNumber::NONE, |task| task.number);
     let target = UsedPlace::Part { object: used.object, part: used.part };
-    let noted = PlaceUse { task, target, value, is_set: sharing.is_change, place };
+    let noted = SharedUse { task, target, value, is_set: sharing.is_change, place };
     if let Some(uses) = &mut vm.scheduler.points.uses {
         uses.push(noted);
     }

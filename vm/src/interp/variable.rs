@@ -7,7 +7,7 @@ use super::{Signal, code_of, constant, failure, word_at};
 use crate::describe::describe;
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::{Exit, Raised};
-use crate::schedule::{PlaceUse, UsedPlace};
+use crate::schedule::{SharedUse, UsedPlace};
 use crate::shape::{CodeKind, Shape};
 use crate::task::{Binding, TaskNumber};
 use crate::value::Value;
@@ -172,7 +172,7 @@ impl Vm {
         let value = if value == Value::UNBOUND { "unbound".into() } else { describe(&self.heap, value) };
         let place = self.scheduler.points.place.take();
         if let Some(uses) = &mut self.scheduler.points.uses {
-            uses.push(PlaceUse { task, target: UsedPlace::Variable(symbol), value, is_set, place });
+            uses.push(SharedUse { task, target: UsedPlace::Variable(symbol), value, is_set, place });
         }
     }
 

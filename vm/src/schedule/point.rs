@@ -55,7 +55,7 @@ pub(crate) enum UsedPlace {
 
 /// A use of a place by a task.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct PlaceUse {
+pub(crate) struct SharedUse {
     /// The task.
     pub(crate) task: TaskNumber,
     /// The used place.
@@ -87,7 +87,7 @@ pub(crate) struct Points {
     /// Whether tasks stop before uses of places that others may reach.
     pub(crate) is_strict: bool,
     /// The uses of places, oldest first; `None` unless a schedule is told.
-    pub(crate) uses: Option<Vec<PlaceUse>>,
+    pub(crate) uses: Option<Vec<SharedUse>>,
     /// Where the program stands that is about to use a special variable.
     pub(crate) place: Option<String>,
     /// The objects of the uses so far, with their names. They may be gone by now.

@@ -80,7 +80,7 @@ pub fn run(
     options: &ExplorationOptions,
 ) -> u8 {
     let prepare = |machine: &mut Vm| esl::program::set_module_path(machine, path);
-    let session = Session {
+    let session = CommandExploration {
         program,
         with_points,
         marked: OnceCell::new(),
@@ -101,7 +101,7 @@ pub fn run(
 }
 
 /// An exploration of a program by the command.
-struct Session<'a> {
+struct CommandExploration<'a> {
     program: &'a Program,
     with_points: &'a dyn Fn() -> Option<Program>,
     /// The program with points, once it was needed.
@@ -123,7 +123,7 @@ struct Searched {
     findings: Vec<Finding>,
 }
 
-impl Session<'_> {
+impl CommandExploration<'_> {
     /// Returns the program with points, if its source is there.
     fn marked(&self) -> Option<&Program> {
         self.marked.get_or_init(self.with_points).as_ref()

@@ -7,9 +7,9 @@ use esl_command::{FAILED, NOT_PROVED, StatusLine};
 use esl_testing::explore::{RandomSettings, Settings, explore_randomly, grains};
 use serde_json::json;
 
-use super::{Session, TellError, findings};
+use super::{CommandExploration, TellError, findings};
 
-impl Session<'_> {
+impl CommandExploration<'_> {
     /// Tries random schedules, at the finest grain that would be explored. Returns the exit status.
     ///
     /// # Errors

@@ -2,9 +2,9 @@
 
 use std::io::Write;
 
-use super::{Searched, Session, TellError, tell};
+use super::{CommandExploration, Searched, TellError, tell};
 
-impl Session<'_> {
+impl CommandExploration<'_> {
     /// Tries all schedules of the program with points before the uses of places that tasks may share, and
     /// tells of those that end badly only then. Returns whether there are some.
     ///

@@ -17,18 +17,18 @@ const CELL: usize = 44;
 
 /// A line of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Row {
+struct StepRow {
     time: u64,
     /// The task; empty for the passing of time.
     task: String,
     text: String,
     place: Option<String>,
-    kind: RowKind,
+    kind: StepRowKind,
 }
 
 /// A kind of line, with what only JSON says of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum RowKind {
+enum StepRowKind {
     Use { target: String, value: String, is_set: bool },
     Step,
     Switch(Switch),
@@ -42,9 +42,9 @@ fn column_name(label: &str) -> String {
 }
 
 /// Returns the lines of a schedule.
-fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Row> {
+fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<StepRow> {
     let matters = uses_that_matter(steps);
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<StepRow> = Vec::new();
     for (step, matters) in steps.iter().zip(matters) {
         let row = match &step.event {
             ScheduleEvent::Use { task, target, value, is_set, place } => {
@@ -54,13 +54,19 @@ fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Row> {
                     (false, false) => format!("reads {target} = {value}"),
                     (false, true) => format!("reads {target}"),
                 };
-                let kind = RowKind::Use { target: target.clone(), value: value.clone(), is_set: *is_set };
-                Row { time: step.time, task: task.clone(), text, place: place.clone(), kind }
+                let kind = StepRowKind::Use { target: target.clone(), value: value.clone(), is_set: *is_set };
+                StepRow { time: step.time, task: task.clone(), text, place: place.clone(), kind }
             }
             ScheduleEvent::Step(StandingTask { label, place }) => {
                 let form = place.as_ref().and_then(|place| forms.text(place));
                 let text = form.unwrap_or_else(|| "goes on".into());
-                Row { time: step.time, task: label.clone(), text, place: place.clone(), kind: RowKind::Step }
+                StepRow {
+                    time: step.time,
+                    task: label.clone(),
+                    text,
+                    place: place.clone(),
+                    kind: StepRowKind::Step,
+                }
             }
             ScheduleEvent::End(_) => continue,
             ScheduleEvent::Switch(switch) => match switch_row(step.time, switch) {
@@ -69,11 +75,10 @@ fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Row> {
             },
         };
         // A task that does a step in parts stands at it several times.
-        let is_repeated = rows
-            .iter()
-            .rev()
-            .take_while(|other| other.task == row.task)
-            .any(|other| row.kind == RowKind::Step && other.kind == row.kind && other.place == row.place);
+        let is_repeated =
+            rows.iter().rev().take_while(|other| other.task == row.task).any(|other| {
+                row.kind == StepRowKind::Step && other.kind == row.kind && other.place == row.place
+            });
         if matters && !is_repeated && rows.last() != Some(&row) {
             rows.push(row);
         }
@@ -82,7 +87,7 @@ fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Row> {
 }
 
 /// Returns the lines without those before other tasks come into play, and not too many.
-fn shortened(mut rows: Vec<Row>) -> Vec<Row> {
+fn shortened(mut rows: Vec<StepRow>) -> Vec<StepRow> {
     let first = rows.first().map(|row| row.task.clone()).unwrap_or_default();
     let alone = rows.iter().take_while(|row| row.task == first).count();
     if alone < rows.len() {
@@ -93,34 +98,34 @@ fn shortened(mut rows: Vec<Row>) -> Vec<Row> {
         let mut at = 0;
         rows.retain(|row| {
             at += 1;
-            row.kind != RowKind::Step || at > alone && !(is_late && at > until)
+            row.kind != StepRowKind::Step || at > alone && !(is_late && at > until)
         });
     }
     if rows.len() > TOLD_ROWS {
         let last = rows.split_off(rows.len() - TOLD_ROWS / 2);
         let left = rows.split_off(TOLD_ROWS / 2).len();
         let text = format!("… {left} more …");
-        let kind = RowKind::LeftOut(left);
-        rows.push(Row { time: last[0].time, task: String::new(), text, place: None, kind });
+        let kind = StepRowKind::LeftOut(left);
+        rows.push(StepRow { time: last[0].time, task: String::new(), text, place: None, kind });
         rows.extend(last);
     }
     rows
 }
 
 /// Returns the line of a choice; `None` if the order of the lines shows it.
-fn switch_row(time: u64, switch: &Switch) -> Option<Row> {
+fn switch_row(time: u64, switch: &Switch) -> Option<StepRow> {
     let (task, text) = match switch {
         Switch::Preemption { stopped, .. } => (stopped, "has to stop before".to_owned()),
         Switch::Order { .. } => return None,
         Switch::Timer { passed, .. } => {
             let text = format!("{} s pass, and timers end", seconds(*passed));
-            let kind = RowKind::Switch(switch.clone());
-            return Some(Row { time, task: String::new(), text, place: None, kind });
+            let kind = StepRowKind::Switch(switch.clone());
+            return Some(StepRow { time, task: String::new(), text, place: None, kind });
         }
         Switch::Choice { task, form } => (task, format!("chooses form {}", form + 1)),
     };
     let (label, place) = (task.label.clone(), task.place.clone());
-    Some(Row { time, task: label, text, place, kind: RowKind::Switch(switch.clone()) })
+    Some(StepRow { time, task: label, text, place, kind: StepRowKind::Switch(switch.clone()) })
 }
 
 /// Returns of each step whether it matters; of uses, those of a place that several tasks use, of which one
@@ -189,7 +194,7 @@ pub(super) fn lines(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Stri
         let cell = |task: &&str| if row.task == *task { cut(&row.text, CELL) } else { String::new() };
         let cells: Vec<String> = tasks.iter().map(cell).collect();
         let place = match (&row.place, &row.kind) {
-            (Some(place), RowKind::Step) => place.clone(),
+            (Some(place), StepRowKind::Step) => place.clone(),
             (Some(place), _) => forms.describe(place),
             (None, _) => String::new(),
         };
@@ -201,19 +206,19 @@ pub(super) fn lines(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Stri
 /// Returns a schedule as JSON: an array of the lines of its table.
 pub(super) fn json(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Json> {
     let rows = rows(steps, forms);
-    let item = |row: &Row| {
+    let item = |row: &StepRow| {
         let form = row.place.as_ref().and_then(|place| forms.text(place));
         let (time, task, place) = (seconds(row.time), &row.task, &row.place);
         match &row.kind {
-            RowKind::Use { target, value, is_set } => json!({
+            StepRowKind::Use { target, value, is_set } => json!({
                 "kind": if *is_set { "set" } else { "read" }, "time": time, "task": task, "variable": target,
                 "value": value, "place": place, "form": form,
             }),
-            RowKind::Step => {
+            StepRowKind::Step => {
                 json!({ "kind": "step", "time": time, "task": task, "place": place, "form": form })
             }
-            RowKind::Switch(switch) => switch_json(time, switch, forms),
-            RowKind::LeftOut(count) => json!({ "kind": "left-out", "count": count }),
+            StepRowKind::Switch(switch) => switch_json(time, switch, forms),
+            StepRowKind::LeftOut(count) => json!({ "kind": "left-out", "count": count }),
         }
     };
     rows.iter().map(item).collect()

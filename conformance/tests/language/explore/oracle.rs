@@ -16,7 +16,7 @@ use super::compile;
 /// Programs that are tried unless the variable says how many.
 const PROGRAMS: u64 = 25;
 
-/// What all programs begin with.
+/// The beginning of all programs.
 const SETUP: &str = "
     (defvar *seen-1* '())
     (defvar *seen-2* '())
