@@ -94,7 +94,9 @@ fn shortened(mut rows: Vec<StepRow>) -> Vec<StepRow> {
         // Nor what a task does that begins when the others have come to their ends.
         let last = rows.last().map(|row| row.task.clone()).unwrap_or_default();
         let until = rows.iter().rposition(|row| row.task != last).map_or(0, |at| at + 1);
-        let is_late = rows[alone.min(until)..until].iter().all(|row| row.task != last);
+        let is_dropped = |at: usize, row: &StepRow| at < alone && row.kind == StepRowKind::Step;
+        let mut before = rows[..until].iter().enumerate();
+        let is_late = before.all(|(at, row)| row.task != last || is_dropped(at, row));
         let mut at = 0;
         rows.retain(|row| {
             at += 1;
