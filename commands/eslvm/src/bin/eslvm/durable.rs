@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use clap::Args;
 use esl::host::{ProcessSignal, RealHost, SurveyRequest};
 use esl::module_path::ModulePath;
-use esl::program;
+use esl::program::{self, Instrumentation};
 use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain};
 use esl_durable::{
     Downtime, Durability, DurableError, DurableOptions, DurableRun, DurableState, Resumed, look,
@@ -131,7 +131,7 @@ pub(crate) fn run_durable(
         pauses && signal == ProcessSignal::Terminate && control.pause()
     });
     run.control().on_resume(say_resumed);
-    let (program, _) = program(file, path, options, false, reports.is_quiet, &signals)?;
+    let (program, _) = program(file, path, options, Instrumentation::None, reports.is_quiet, &signals)?;
     if run.arguments().is_some_and(|known| known != arguments) {
         return Err(refused(&DurableError::OtherSettings("other arguments of the program")));
     }
