@@ -235,6 +235,30 @@ fn a_failure_of_a_mock_keeps_its_calls() {
     assert!(lines.contains(&"  in GO-ON, f.esl:7:23".to_owned()), "{lines:#?}");
 }
 
+/// A mock runs in a task of its own, whose calls come before those of the task that called it.
+#[test]
+fn a_mock_that_fails_in_a_net_keeps_the_calls_of_both_tasks() {
+    let program = "(defun turn () (fail :stuck 3))
+(define-mock wheel (side) (list side (turn)))
+(defun drive () (list (wheel :left)))
+(task-net (a (list (drive))) (b (sleep 1)))";
+    let lines = report("mock-in-a-net", program, &[]);
+    let expected = [
+        "A failure of cause :STUCK with 3.",
+        "  in TURN, f.esl:1:16",
+        "  in (ESL::MOCK WHEEL), f.esl:2:38",
+        "  in task WHEEL, made at f.esl:2:1",
+        "  in WHEEL, f.esl:2:1 (tail call)",
+        "  in DRIVE, f.esl:3:23",
+        "  in (TASK A), f.esl:4:20",
+        "  in task A, made at f.esl:4:1",
+        "  in top level, f.esl:4:1",
+        "Failure :STUCK, no recovery available.",
+        "Aborted",
+    ];
+    assert_eq!(lines, expected);
+}
+
 /// The report of a task that no other task waits for says where its body begins.
 #[test]
 fn a_task_of_its_own_says_where_it_begins() {
