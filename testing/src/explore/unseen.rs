@@ -381,7 +381,7 @@ mod tests {
             ("(defun f () 1) (defclass tank () ()) (defmethod level ((tank tank)) 1)", &[]),
             ("(defun f () (setf (symbol-function 'g) (lambda () 1)))", &[Definition]),
             ("(defun f () (defun g () 1))", &[Definition]),
-            ("(defun f (x) (change-class x 'tank))", &[Definition]),
+            ("(defun f (x) (change-class x 'tank))", &[Slot, Definition]),
             ("(defun f (name) (intern name))", &[Definition]),
             ("(spawn (print 1)) (defun f () 1)", &[LateDefinition]),
             ("(defun go-on () (spawn (print 1))) (defun f () 1) (go-on)", &[]),

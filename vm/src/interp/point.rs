@@ -47,7 +47,7 @@ struct UsedPart {
 /// # Safety
 /// There is an instruction at `pc`, of the function of the frame at `base`, whose registers have values.
 unsafe fn note_use(vm: &mut Vm, pc: *const u32, base: *mut Value) {
-    // SAFETY: an instruction is at `pc`, as the contract says; F2: below the base is the function of its frame.
+    // SAFETY: an instruction is at `pc`, as the contract says; F2: below the base is the frame's function.
     let (instr, function) = unsafe {
         let word = word_at(pc);
         let Some(opcode) = word.opcode() else { return };

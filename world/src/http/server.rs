@@ -131,7 +131,17 @@ pub(super) fn add(rows: &mut HostRows) {
          Returns the port. The input with the name INPUT is signalled with each request: its \
          number, method, path, the parts of that, query, headers, body, a text if it is UTF-8, and bytes otherwise, \
          and whether it begins a connection of WebSocket; and with the number alone when the client of one has gone.",
-        listen,
+        |sender: Sender,
+         server: HostHandle<ServerSlot>,
+         input: HostInput,
+         address: String,
+         most: usize,
+         certificate: Option<String>,
+         key: Option<String>,
+         clients: Option<String>| async move {
+            let secured = Secured::read(certificate, key, clients).await?;
+            listen(sender, server, input, address, most, secured).await
+        },
     )
     .needs(Right::Net, "address")
     .needs(Right::Read, "certificate")
@@ -183,11 +193,8 @@ async fn listen(
     input: HostInput,
     address: String,
     most: usize,
-    certificate: Option<String>,
-    key: Option<String>,
-    clients: Option<String>,
+    secured: Secured,
 ) -> Result<u16, HostFailure> {
-    let secured = Secured::read(certificate, key, clients).await?;
     let listener = bind(&address).await.map_err(|error| bind_failure(&error))?;
     let port = listener.local_addr().map_or(0, |address| address.port());
     let shared = Arc::new(ServerState {

@@ -150,7 +150,7 @@ fn a_second_process_and_another_program_are_refused() {
     assert!(agent.state(&[]).2.contains("is in use by another process"));
     running.send("-KILL");
     running.end();
-    agent.folder.file("agent.esl", &AGENT.replace("\"~?~%\"", "\"~?.~%\""));
+    agent.folder.file("agent.esl", AGENT.replace("\"~?~%\"", "\"~?.~%\""));
     let (status, _, errors) = agent.run(&[]);
     assert_eq!(status, Some(2));
     assert!(errors.contains("another program: changed: SAY"), "{errors}");
