@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::RunCheck;
 
-/// Where a replay is not the recorded run, and in what.
+/// The place and the kind of a difference between a replay and the recorded run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Divergence {
     /// Number of the record, from 1 on.

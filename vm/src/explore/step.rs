@@ -96,7 +96,7 @@ pub enum ScheduleEvent {
         value: String,
         /// Whether the place was set.
         is_set: bool,
-        /// Where the program stands, as `file:line:column`, if it was compiled with points.
+        /// Place in the program, as `file:line:column`, if it was compiled with points.
         place: Option<String>,
     },
 }

@@ -64,7 +64,7 @@ pub(crate) struct SharedUse {
     pub(crate) value: String,
     /// Whether the place was changed.
     pub(crate) is_set: bool,
-    /// Where the program stands, as `file:line:column`.
+    /// Place in the program, as `file:line:column`.
     pub(crate) place: Option<String>,
 }
 
@@ -88,7 +88,7 @@ pub(crate) struct Points {
     pub(crate) is_strict: bool,
     /// The uses of places, oldest first; `None` unless a schedule is told.
     pub(crate) uses: Option<Vec<SharedUse>>,
-    /// Where the program stands that is about to use a special variable.
+    /// Place in the program of the next use of a special variable.
     pub(crate) place: Option<String>,
     /// The objects of the uses so far, with their names. They may be gone by now.
     pub(crate) objects: Vec<(Value, String)>,
