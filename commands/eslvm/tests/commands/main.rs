@@ -88,7 +88,7 @@ mod ws;
 #[cfg(unix)]
 mod ws_peers;
 
-use std::process::Command;
+use std::process::{Child, Command};
 
 use esl_conformance::process;
 
@@ -107,6 +107,19 @@ fn eslc(arguments: &[&str]) -> Command {
 /// The command `eslvm` with these arguments.
 fn eslvm(arguments: &[&str]) -> Command {
     process::command(ESLVM, arguments)
+}
+
+/// Returns the most resident memory that a process of `eslvm` has had so far, in mebibytes; `None` before its
+/// program is there, and after its end.
+///
+/// A process that was just spawned shares the memory of this one for a moment: its name is the first sign of
+/// memory of its own.
+fn most_memory(child: &Child) -> Option<usize> {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
+    let value = |key: &str| status.lines().find_map(|line| line.strip_prefix(key)).map(str::trim);
+    (value("Name:")? == "eslvm").then_some(())?;
+    let kibibytes: usize = value("VmHWM:")?.trim_end_matches(" kB").parse().ok()?;
+    Some(kibibytes / 1024)
 }
 
 /// Says that a test was left out, and why.

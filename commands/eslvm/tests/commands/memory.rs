@@ -5,12 +5,12 @@
 //! what they use never reach it.
 
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::eslvm;
+use super::{eslvm, most_memory};
 
 /// Mebibytes of `--memory`.
 const LIMIT: usize = 24;
@@ -27,14 +27,6 @@ const BOMBS: &str = include_str!("../../../../conformance/bombs.esl");
 /// Programs that use much memory over time and little at once, each below what it uses.
 const LEAKS: &str = include_str!("../../../../conformance/leaks.esl");
 
-/// Returns the most resident memory of a process so far, in mebibytes; `None` once it has ended.
-fn peak_of(child: &Child) -> Option<usize> {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    let kibibytes: usize = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kibibytes / 1024)
-}
-
 /// Runs a program. Returns its exit status, and its most resident memory in mebibytes.
 fn run(folder: &Path, name: &str, text: &str, limit: usize, options: &[&str]) -> (Option<i32>, usize) {
     let path = folder.join(format!("{}.esl", name.replace(' ', "-")));
@@ -46,7 +38,7 @@ fn run(folder: &Path, name: &str, text: &str, limit: usize, options: &[&str]) ->
     let mut child = command.spawn().expect("eslvm starts");
     let (started, mut peak) = (Instant::now(), 0);
     loop {
-        peak = peak.max(peak_of(&child).unwrap_or(0));
+        peak = peak.max(most_memory(&child).unwrap_or(0));
         if let Some(status) = child.try_wait().expect("the state of a child is known") {
             return (status.code(), peak);
         }

@@ -38,14 +38,6 @@ const PROGRAM: &str = "(require :ros)
                (say (list (length (ros:field (wait-for-event image :timeout 60) :data))
                           (plusp (+ (input-dropped image) (ros:lost node image)))))))))))";
 
-/// Returns the most memory that a process has had, in MB.
-fn most_memory(running: &Running) -> u64 {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", running.child.id()));
-    let status = status.expect("the process runs");
-    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("the system says it");
-    peak.trim().trim_end_matches(" kB").parse::<u64>().expect("a number") / 1024
-}
-
 #[test]
 fn peers_that_break_the_rules_are_named_once_and_stop_nothing() {
     let Some(python) = python() else { return };
@@ -85,6 +77,6 @@ fn peers_that_break_the_rules_are_named_once_and_stop_nothing() {
     assert_eq!(program.line(), "\"flooded\"");
     program.tell("image");
     assert_eq!(program.line(), "(1000000 T)");
-    let memory = most_memory(&program);
+    let memory = super::most_memory(&program.child).expect("the process runs");
     assert!(memory < 400, "{memory} MB");
 }
