@@ -1,5 +1,4 @@
 //! `eslc format`: reads the files, formats them, and writes, checks or shows the result.
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
 
 use std::io::IsTerminal;
 use std::ops::RangeInclusive;
@@ -8,7 +7,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use esl::module_path::ModulePath;
 use esl::program::Source;
-use esl_command::{FAILED, NOT_COMPILED, SUCCESS, USAGE, complain, read_source, replace_file};
+use esl_command::{
+    FAILED, NOT_COMPILED, SUCCESS, USAGE, complain, read_source, replace_file, say, say_error, say_part,
+};
 use esl_compiler::diagnostic::{Format, Renderer, Sources};
 use esl_compiler::reader::structure_faults;
 use esl_format::{format, styles_of};
@@ -112,7 +113,7 @@ fn format_file(file: &Path, options: &FormatOptions, folders: &[PathBuf]) -> u8 
         return show(&source, &formatted, options, is_changed);
     }
     if file.as_os_str() == "-" {
-        print!("{formatted}");
+        say_part!("{formatted}");
     } else if is_changed && let Err(error) = replace_file(file, formatted.as_bytes()) {
         complain(format_args!("{} cannot be written: {error}", file.display()));
         return USAGE;
@@ -127,7 +128,7 @@ fn can_be_read(source: &Source) -> bool {
     let faults = structure_faults(id, &source.text);
     let renderer = Renderer { color: std::io::stderr().is_terminal(), format: Format::Human };
     for fault in &faults {
-        eprintln!("{}\n", renderer.render(fault, &sources));
+        say_error!("{}\n", renderer.render(fault, &sources));
     }
     if !faults.is_empty() {
         complain(format_args!("{} is left as it is: repair it first", source.name));
@@ -139,9 +140,9 @@ fn show(source: &Source, formatted: &str, options: &FormatOptions, is_changed: b
     if is_changed && options.diff {
         let diff = TextDiff::from_lines(&*source.text, formatted);
         let after = format!("{} (formatted)", source.name);
-        print!("{}", diff.unified_diff().context_radius(3).header(&source.name, &after));
+        say_part!("{}", diff.unified_diff().context_radius(3).header(&source.name, &after));
     } else if is_changed {
-        println!("{}", source.name);
+        say!("{}", source.name);
     }
     if is_changed { FAILED } else { SUCCESS }
 }

@@ -2,7 +2,6 @@
 //! such files, `eslvm mcap`.
 //!
 //! All belong to the feature `robots`; without it they are refused with what to type.
-#![allow(clippy::print_stderr, reason = "commands print")]
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -175,7 +174,7 @@ mod with_robots {
                         complain(fault);
                         USAGE
                     })?;
-                    eprintln!("; Foxglove at ws://{}", live.address());
+                    esl_command::say_error!("; Foxglove at ws://{}", live.address());
                     sinks.push(live.clone());
                     Some(live)
                 }

@@ -23,13 +23,12 @@
 //! drop(served);
 //! # Ok::<(), esl::Error>(())
 //! ```
-#![allow(clippy::print_stderr, reason = "commands say where they can be reached")]
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
-use esl_command::{USAGE, complain};
+use esl_command::{USAGE, complain, say_error};
 #[cfg(unix)]
 use esl_operate::service::{ServiceManager, WatchedRun};
 use esl_operate::{ServedPlaces, ServedRun, parse_address};
@@ -91,7 +90,7 @@ impl OperateOptions {
     /// # Errors
     /// The exit status, after a message.
     pub fn begin(&self, machine: &mut Vm, program: &str) -> Result<ServedRun, u8> {
-        self.places().begin(machine, program, &mut |line| eprintln!("{line}")).map_err(|error| {
+        self.places().begin(machine, program, &mut |line| say_error!("{line}")).map_err(|error| {
             complain(error);
             USAGE
         })

@@ -151,7 +151,7 @@ fn source(name: String, bytes: Vec<u8>) -> Result<Source, u8> {
     let id = sources.add(name.clone(), None);
     decode(id, bytes).map(|text| Source::new(name, text)).map_err(|diagnostic| {
         let renderer = Renderer { color: std::io::stderr().is_terminal(), format: Format::Human };
-        eprintln!("{}", renderer.render(&diagnostic, &sources));
+        say_error!("{}", renderer.render(&diagnostic, &sources));
         NOT_COMPILED
     })
 }

@@ -12,7 +12,9 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 #![forbid(unsafe_code)]
-#![allow(clippy::print_stderr, reason = "commands print")]
+
+#[macro_use]
+mod say;
 
 mod file;
 mod folder;
@@ -30,6 +32,7 @@ use esl::program::{Compiled, Ended};
 
 pub use file::{ProgramFile, read_program, read_source, refuse_compiled, refuse_overwriting, replace_file};
 pub use folder::{is_test_file, sources_in};
+pub use say::{print_error, print_text};
 pub use shell::{print_completions, write_man_pages};
 pub use status_line::{StatusLine, wants_color};
 pub use usage::{Habits, parse};
@@ -67,7 +70,7 @@ fn command_name() -> String {
 
 /// Prints a message of the command itself.
 pub fn complain(text: impl std::fmt::Display) {
-    eprintln!("{}: {text}", command_name());
+    say_error!("{}: {text}", command_name());
 }
 
 /// Errors, and warnings, that are shown to people. To find the place of one takes time with the length of its
@@ -79,7 +82,7 @@ const SHOWN_DIAGNOSTICS: usize = 100;
 pub fn print_diagnostics(compiled: &Compiled, renderer: &Renderer) {
     if renderer.format == Format::Json {
         for diagnostic in &compiled.diagnostics {
-            eprintln!("{}", renderer.render(diagnostic, &compiled.sources));
+            say_error!("{}", renderer.render(diagnostic, &compiled.sources));
         }
         return;
     }
@@ -91,7 +94,7 @@ pub fn print_diagnostics(compiled: &Compiled, renderer: &Renderer) {
         };
         *number += 1;
         if *number <= SHOWN_DIAGNOSTICS {
-            eprintln!("{}\n", renderer.render(diagnostic, &compiled.sources));
+            say_error!("{}\n", renderer.render(diagnostic, &compiled.sources));
         }
     }
     if compiled.diagnostics.is_empty() {

@@ -1,9 +1,8 @@
 //! `eslvm explore`: runs a program under all schedules, and tells of those that end badly.
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
 
 use std::cell::{OnceCell, RefCell};
 use std::fmt;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -12,7 +11,7 @@ use esl::Error;
 use esl::module_path::ModulePath;
 use esl::program::Schedule;
 use esl::program::{Ended, Program};
-use esl_command::{FAILED, NOT_PROVED, SUCCESS, StatusLine, USAGE, complain};
+use esl_command::{FAILED, NOT_PROVED, SUCCESS, StatusLine, USAGE, complain, say};
 use esl_testing::explore::{
     Behaviour, Exploration, ExplorationScope, ExploredEnding, Grain, Livelock, Prepare, RandomSettings,
     ScheduleEvent, ScheduleStep, SearchLimit, SearchProgress, Settings, SourceForms, TimerGrain,
@@ -21,11 +20,6 @@ use esl_testing::explore::{
 use esl_timeline::Timeline;
 use esl_vm::vm::Vm;
 use serde_json::json;
-
-/// Prints a line, and ignores a closed pipe; the exit status states the result in any case.
-macro_rules! say {
-    ($($part:tt)*) => { _ = writeln!(std::io::stdout(), $($part)*) };
-}
 
 mod random;
 mod strict;

@@ -1,9 +1,8 @@
 //! Random schedules, in place of all.
 
-use std::io::Write;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use esl_command::{FAILED, NOT_PROVED, StatusLine};
+use esl_command::{FAILED, NOT_PROVED, StatusLine, say};
 use esl_testing::explore::{RandomSettings, Settings, explore_randomly, grains};
 use serde_json::json;
 

@@ -1,6 +1,6 @@
 //! Fragile updates: those that are safe only because no tick lies between a read and a write.
 
-use std::io::Write;
+use esl_command::say;
 
 use super::{CommandExploration, Searched, TellError, tell};
 

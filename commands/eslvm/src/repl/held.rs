@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use esl_command::say_part;
 use esl_host::{HostRows, Incoming};
 use esl_vm::task::{TaskId, TaskNumber, TaskResult};
 use esl_vm::vm::Vm;
@@ -81,8 +82,8 @@ impl Repl {
         let end = |story: &str| format!("{story}{}", failure.ending);
         self.machine.flush();
         let shown = in_short(&format!("{}Aborted\n", end(&failure.story)));
-        print!("{}", shown.strip_suffix("Aborted\n").unwrap_or(&shown));
-        print!("Restarts, chosen by `:restart N`:\n{}", failure.restarts);
+        say_part!("{}", shown.strip_suffix("Aborted\n").unwrap_or(&shown));
+        say_part!("Restarts, chosen by `:restart N`:\n{}", failure.restarts);
         let (report, full) = (end(&story), failure.full.as_deref().map(end));
         self.failure = Some(FormFailure { report, full, noted: self.noted_failures() });
         if is_it {

@@ -16,7 +16,6 @@
 //! let status = eslvm::repl::run(Config::default(), Rights::none(), false, &ModulePath::none());
 //! assert_eq!(status, Ok(0));
 //! ```
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "the REPL talks with people")]
 
 mod attached;
 pub(crate) mod commands;
@@ -45,7 +44,7 @@ pub use attached::attach;
 use commands::{LineMeaning, SessionCommand, completions_of, help, meaning_of};
 use esl::module_path::ModulePath;
 use esl::program;
-use esl_command::{NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, complain};
+use esl_command::{NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, complain, say, say_part};
 use foreign::foreign;
 use held::HeldFailures;
 use lines::{CompletionRequest, Line, WordCompletion};
@@ -126,7 +125,7 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
     machine.tell_variables();
     machine.keep_journal();
     if is_interactive {
-        println!("ESL {}; :help lists the commands, TAB completes, Ctrl-D ends", env!("CARGO_PKG_VERSION"));
+        say!("ESL {}; :help lists the commands, TAB completes, Ctrl-D ends", env!("CARGO_PKG_VERSION"));
     }
     let held_failures = HeldFailures::install(&mut machine);
     let (failure, held) = (None, Vec::new());
@@ -257,7 +256,7 @@ impl Repl {
                             self.machine.flush();
                             return Ok(SUCCESS);
                         }
-                        Evaluated::Help => print!("{}", help(COMMANDS)),
+                        Evaluated::Help => say_part!("{}", help(COMMANDS)),
                     }
                     self.typing.remember(std::mem::take(&mut text).trim_end());
                 }
@@ -288,7 +287,7 @@ impl Repl {
     /// Evaluates the forms of a text and prints their values.
     fn evaluate(&mut self, text: &str) -> Evaluated {
         if let Some(answer) = foreign(text) {
-            print!("{answer}");
+            say_part!("{answer}");
             return Evaluated::Done;
         }
         let Some(value) = self.call("%REPL-EVALUATE", text) else { return Evaluated::Done };
@@ -311,7 +310,7 @@ impl Repl {
         let (command, path) = match meaning_of(line, COMMANDS) {
             LineMeaning::Command(command, argument) => (command, argument),
             LineMeaning::NoCommand(reason) => {
-                println!("; {reason}");
+                say!("; {reason}");
                 return Continue(());
             }
             LineMeaning::Form => return Continue(()),
@@ -321,20 +320,20 @@ impl Repl {
                 self.machine.flush();
                 return Break(SUCCESS);
             }
-            ":load" if path.is_empty() => println!("; `:load` needs the path of a file"),
+            ":load" if path.is_empty() => say!("; `:load` needs the path of a file"),
             ":load" => {
                 let bare = path.strip_prefix('"').and_then(|path| path.strip_suffix('"'));
                 self.call("%REPL-LOAD", bare.unwrap_or(path));
             }
             ":bt" => match self.newest_failure() {
-                Some((_, Some(full))) if path.trim() == "full" => print!("{full}"),
-                Some((report, _)) => print!("{report}"),
-                None => println!("Nothing has failed."),
+                Some((_, Some(full))) if path.trim() == "full" => say_part!("{full}"),
+                Some((report, _)) => say_part!("{report}"),
+                None => say!("Nothing has failed."),
             },
             ":restart" => self.restart(path),
-            ":tasks" => print!("{}", self.machine.task_report()),
+            ":tasks" => say_part!("{}", self.machine.task_report()),
             ":abort" => self.abort(path),
-            _ => print!("{}", help(COMMANDS)),
+            _ => say_part!("{}", help(COMMANDS)),
         }
         self.unless_exited()
     }
@@ -345,13 +344,13 @@ impl Repl {
         let request = SurveyRequest { named: vec![named], ..SurveyRequest::default() };
         match self.machine.survey(&request).tasks.first() {
             Some(task) => {
-                println!("; {} is aborted", task.name);
+                say!("; {} is aborted", task.name);
                 self.machine.inbox().put(Incoming::Abort(named));
             }
             None if number.is_empty() => {
-                println!("; `:abort` needs the number of a task, which `:tasks` shows");
+                say!("; `:abort` needs the number of a task, which `:tasks` shows");
             }
-            None => println!("; task {number} does not exist; `:tasks` shows their numbers"),
+            None => say!("; task {number} does not exist; `:tasks` shows their numbers"),
         }
     }
 
@@ -426,10 +425,10 @@ impl Repl {
             TaskResult::Succeeded(values) => return values.first().copied(),
             TaskResult::Failed(_) => match report {
                 Some(report) => {
-                    print!("{}", in_short(&report));
+                    say_part!("{}", in_short(&report));
                     self.failure = Some(FormFailure { report, full, noted: self.noted_failures() });
                 }
-                None => println!("Aborted"),
+                None => say!("Aborted"),
             },
             // The output of the task may have ended within a line.
             _ if self.machine.exit_status().is_none() => _ = self.call("%REPL-ABORTED", ""),

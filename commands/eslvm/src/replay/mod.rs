@@ -1,5 +1,4 @@
 //! `eslvm replay`.
-#![allow(clippy::print_stdout, reason = "commands print")]
 
 mod session;
 
@@ -8,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
-use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain, refuse_overwriting};
+use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain, refuse_overwriting, say};
 use esl_host::{Host, Output, ReplayHost};
 use esl_replay::{Breakpoint, Recorded, RecordedError, Replayed, Rerun, RerunError, Target};
 use esl_timeline::Timeline;
@@ -110,7 +109,7 @@ pub fn run(options: &ReplayOptions) -> Result<u8, u8> {
             Replayed::Equal(status) => format!("status {status}"),
             _ => "the end of the recording, before that of the run".into(),
         };
-        println!("equal: {} records, {checks} checks, {ticks} ticks, {ending}", rerun.host().replayed());
+        say!("equal: {} records, {checks} checks, {ticks} ticks, {ending}", rerun.host().replayed());
         return Ok(SUCCESS);
     }
     Ok(status)

@@ -1,11 +1,10 @@
 //! The commands with which a person, or a script, moves through a replay.
-#![allow(clippy::print_stdout, reason = "a session talks with people")]
 
 use std::io::{IsTerminal, Write};
 use std::str::FromStr;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use esl_command::{DIVERGED, SUCCESS, complain};
+use esl_command::{DIVERGED, SUCCESS, complain, say, say_part};
 use esl_replay::{Breakpoint, Debugger, Recorded, Replayed, RerunError, Target};
 
 use super::show;
@@ -56,7 +55,7 @@ pub(super) fn run(
     let is_interactive = std::io::stdin().is_terminal();
     let names = Arc::new(Mutex::new(Vec::new()));
     let mut lines: Box<dyn Lines> = if is_interactive {
-        println!("`help` lists the commands, TAB completes, Ctrl-D ends");
+        say!("`help` lists the commands, TAB completes, Ctrl-D ends");
         let known = names.clone();
         let complete = move |before: &str, word: &str| completions(before, word, &lock(&known));
         Box::new(Editor::new(&PromptScreen::default(), HISTORY, Box::new(complete)))
@@ -137,42 +136,42 @@ impl Session {
             "continue" | "c" => self.go_on()?,
             "reverse-continue" | "rc" => match self.debugger.go_back()? {
                 Some(what) => {
-                    println!("{what}");
+                    say!("{what}");
                     self.say_where()?;
                 }
                 None => {
-                    println!("No breakpoint before this place: this is the beginning.");
+                    say!("No breakpoint before this place: this is the beginning.");
                     self.say_where()?;
                 }
             },
             "until" => match Target::from_str(argument) {
                 Ok(target) => self.until(&target)?,
-                Err(error) => println!("{error}"),
+                Err(error) => say!("{error}"),
             },
             "break" if argument.is_empty() => {
                 for breakpoint in self.debugger.breakpoints() {
-                    println!("{breakpoint}");
+                    say!("{breakpoint}");
                 }
             }
             "break" => match Breakpoint::from_str(argument) {
                 Ok(breakpoint) => self.debugger.add_breakpoint(breakpoint)?,
-                Err(error) => println!("{error}"),
+                Err(error) => say!("{error}"),
             },
             "where" => self.say_where()?,
-            "tasks" => print!("{}", self.debugger.tasks()?),
-            "bt" => print!("{}", self.debugger.backtrace(argument)?),
+            "tasks" => say_part!("{}", self.debugger.tasks()?),
+            "bt" => say_part!("{}", self.debugger.backtrace(argument)?),
             "facts" if argument.is_empty() => expected("a query, such as (door ?name open)"),
             "facts" => {
                 let quoted = argument.strip_prefix('\'').unwrap_or(argument);
-                print!("{}", self.debugger.evaluate(&format!("(db-query '{quoted})"))?);
+                say_part!("{}", self.debugger.evaluate(&format!("(db-query '{quoted})"))?);
             }
             "print" | "p" if argument.is_empty() => expected("a form"),
-            "print" | "p" => print!("{}", self.debugger.evaluate(argument)?),
+            "print" | "p" => say_part!("{}", self.debugger.evaluate(argument)?),
             "quit" | "q" | "exit" => return Ok(false),
-            "help" => print!("{}", help(COMMANDS)),
+            "help" => say_part!("{}", help(COMMANDS)),
             _ => match nearest(command, COMMANDS) {
-                Some(name) => println!("Unknown command `{command}`; did you mean `{name}`?"),
-                None => println!("Unknown command `{command}`; `help` lists them."),
+                Some(name) => say!("Unknown command `{command}`; did you mean `{name}`?"),
+                None => say!("Unknown command `{command}`; `help` lists them."),
             },
         }
         Ok(true)
@@ -199,7 +198,7 @@ impl Session {
         let found = self.debugger.go_on()?;
         self.debugger.show_output();
         if let Some(what) = found {
-            println!("{what}");
+            say!("{what}");
         }
         self.say_where()
     }
@@ -212,12 +211,12 @@ impl Session {
     fn say_where(&mut self) -> Result<(), RerunError> {
         self.debugger.show_output();
         match self.debugger.replayed() {
-            None => println!("{}", self.debugger.place()?),
+            None => say!("{}", self.debugger.place()?),
             Some(Replayed::Equal(status)) => {
-                println!("tick {}: the run has ended with status {status}", self.debugger.ticks());
+                say!("tick {}: the run has ended with status {status}", self.debugger.ticks());
             }
             Some(Replayed::Cut) => {
-                println!("tick {}: the recording ends here, before the run", self.debugger.ticks());
+                say!("tick {}: the recording ends here, before the run", self.debugger.ticks());
             }
             Some(Replayed::Diverged(text)) => complain(text),
         }
@@ -231,5 +230,5 @@ fn number(text: &str) -> Option<i64> {
 }
 
 fn expected(what: &str) {
-    println!("Expected {what}; `help` shows how.");
+    say!("Expected {what}; `help` shows how.");
 }

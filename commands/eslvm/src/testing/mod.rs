@@ -1,5 +1,4 @@
 //! `eslvm test`: the tests of several files, in several threads, and what is said of them.
-#![allow(clippy::print_stdout, reason = "commands print")]
 
 mod junit;
 mod watch;
@@ -15,7 +14,8 @@ use esl::module_path::ModulePath;
 use esl::program::{self, Modules, Program};
 use esl_command as command;
 use esl_command::{
-    FAILED, NO_TESTS, NOT_COMPILED, ProgramFile, SUCCESS, StatusLine, USAGE, complain, refuse_compiled,
+    FAILED, NO_TESTS, NOT_COMPILED, ProgramFile, SUCCESS, StatusLine, USAGE, complain, refuse_compiled, say,
+    say_part,
 };
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_host::Rights;
@@ -87,9 +87,9 @@ pub fn run(paths: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
     loop {
         let before = watch::state(&folders);
         run_once(paths, library, options);
-        println!("\nwaiting for a change of a source; Ctrl-C ends");
+        say!("\nwaiting for a change of a source; Ctrl-C ends");
         watch::wait(&folders, &before);
-        println!();
+        say!();
     }
 }
 
@@ -189,7 +189,7 @@ fn run_files(found: &TestFiles, library: &[PathBuf], options: &Options) -> Resul
     }
     run_all(&runs, options);
     let failed = runs.iter().filter(|run| has_failed(run)).count();
-    println!("{} passed, {failed} failed", runs.len() - failed);
+    say!("{} passed, {failed} failed", runs.len() - failed);
     if let Some(path) = &options.junit
         && let Err(error) = std::fs::write(path, junit::report(&runs))
     {
@@ -201,7 +201,7 @@ fn run_files(found: &TestFiles, library: &[PathBuf], options: &Options) -> Resul
         for coverage in suites.iter().filter_map(|suite| suite.setup.coverage.as_ref()) {
             report.merge(coverage.lock().unwrap_or_else(PoisonError::into_inner).report());
         }
-        print!("\n{}", report.table());
+        say_part!("\n{}", report.table());
         if let Err(error) = std::fs::write(path, report.lcov()) {
             complain(format_args!("{} cannot be written: {error}", path.display()));
             return Err(USAGE);
@@ -336,9 +336,9 @@ fn tell(runs: &[Run<'_>], told: &mut usize, options: &Options) {
         let result = run.result.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(finished) = result.as_ref() else { return };
         if *told == 0 || !std::ptr::eq(runs[*told - 1].suite, run.suite) {
-            println!("{}", run.file());
+            say!("{}", run.file());
         }
-        print!("{}", text(run, finished, options));
+        say_part!("{}", text(run, finished, options));
         *told += 1;
     }
 }

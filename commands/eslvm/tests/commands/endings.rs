@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use esl_conformance::folder::Folder;
 use esl_conformance::process;
 
-use crate::eslvm;
+use crate::{eslc, eslvm};
 
 /// A program that is started and has printed its first line.
 struct Running {
@@ -276,6 +276,46 @@ fn an_output_that_nobody_reads_ends_the_run_as_sigpipe_does() {
     let errors = String::from_utf8_lossy(&done.stderr);
     assert_eq!((done.status.code(), &*errors), (Some(141), ""));
     assert!(folder.path().join("off").exists());
+}
+
+/// What commands print of their own is lost where nobody can read it; the status is as ever.
+#[test]
+#[cfg(target_os = "linux")]
+fn outputs_that_cannot_be_written_stop_no_command() {
+    let program =
+        "(unwind-protect (sleep 0.01) (with-open-file (s \"off\" :direction :output) (write-line \"\" s)))";
+    let tests = "(deftest one (is (= 1 1)))\n(deftest two (is (= 1 2)))";
+    let files = [("program.esl", program), ("one_test.esl", tests), ("wide.esl", "(setq  x 1)")];
+    let folder = Folder::with("full-output", &files);
+    let recorded = process::run(
+        eslvm(&["run", "program.esl", "--record", "program.eslj"]).current_dir(folder.path()),
+        "",
+    );
+    assert_eq!(recorded.status, Some(0), "{}", recorded.errors);
+    let full = || std::fs::File::options().write(true).open("/dev/full").expect("Linux has it");
+    let cases: &[(&[&str], &str, i32)] = &[
+        (&["run", "--stats", "program.esl"], "", 0),
+        (&["test", "one_test.esl"], "", 1),
+        (&["test", "one_test.esl", "--filter", "one"], "", 0),
+        (&["test", "--coverage", "all.info", "one_test.esl", "--filter", "one"], "", 0),
+        (&["explore", "program.esl"], "", 0),
+        (&["replay", "program.eslj"], "", 0),
+        (&["replay", "program.eslj", "--until", "tick:100"], "tasks\nbt\n", 0),
+        (&["repl"], "(+ 1 2)\n(car 1)\n:bt\n", 0),
+    ];
+    for (arguments, input, status) in cases {
+        let mut command = eslvm(arguments);
+        command.current_dir(folder.path()).stdin(Stdio::piped()).stdout(full()).stderr(full());
+        let mut child = command.spawn().expect("the command is there");
+        let mut stdin = child.stdin.take().expect("the input is a pipe");
+        drop(stdin.write_all(input.as_bytes()));
+        drop(stdin);
+        assert_eq!(child.wait().expect("it ends").code(), Some(*status), "{arguments:?}");
+    }
+    assert!(folder.path().join("off").exists());
+    let mut format = eslc(&["format", "--check", "wide.esl"]);
+    format.current_dir(folder.path()).stdout(full()).stderr(full());
+    assert_eq!(format.status().expect("the command is there").code(), Some(1));
 }
 
 #[test]

@@ -1,5 +1,4 @@
 //! `eslvm run --state` and `eslvm state`.
-#![allow(clippy::print_stdout, reason = "commands print")]
 
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -8,7 +7,7 @@ use clap::Args;
 use esl::host::{ProcessSignal, RealHost, SurveyRequest};
 use esl::module_path::ModulePath;
 use esl::program::{self, Instrumentation};
-use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain};
+use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain, say};
 use esl_durable::{
     Downtime, Durability, DurableError, DurableOptions, DurableRun, DurableState, Resumed, look,
 };
@@ -263,7 +262,7 @@ fn print_facts(state: &mut DurableState, name: &str) -> Result<u8, u8> {
         }
         count += survey.facts.len();
         for fact in &survey.facts {
-            println!("{fact}");
+            say!("{fact}");
         }
     }
 }
@@ -278,12 +277,12 @@ fn print_state(state: &mut DurableState) {
         _ => "cut off".into(),
     };
     let facts: usize = survey.relations.iter().map(|relation| relation.facts).sum();
-    println!("program: {file}");
-    println!("machine: {}", state.identity);
-    println!("run: {standing}, tick {}, process {lives}", state.ticks);
-    println!("tasks: {}", survey.figures.tasks.iter().sum::<u64>());
-    println!("facts: {facts} in {} relations", survey.relations.len());
-    println!(
+    say!("program: {file}");
+    say!("machine: {}", state.identity);
+    say!("run: {standing}, tick {}, process {lives}", state.ticks);
+    say!("tasks: {}", survey.figures.tasks.iter().sum::<u64>());
+    say!("facts: {facts} in {} relations", survey.relations.len());
+    say!(
         "journal: {} records, {} effects, {} bytes{}",
         state.records,
         state.effects,
@@ -293,7 +292,7 @@ fn print_state(state: &mut DurableState) {
     if let Some(written) = state.written {
         let since = SystemTime::now().duration_since(written).unwrap_or(Duration::ZERO);
         let date = written.duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
-        println!("written: {} s ago, {date} s since 1970", since.as_secs());
+        say!("written: {} s ago, {date} s since 1970", since.as_secs());
     }
-    println!("verified: the run takes the course of its journal");
+    say!("verified: the run takes the course of its journal");
 }

@@ -1,6 +1,7 @@
 //! Figures of a run, as `--stats` prints them.
 
 use esl::program::Summary;
+use esl_command::say_error;
 use esl_vm::vm::{Tier, Vm};
 use eslvm::profile::{Profile, ProfiledFunction, UsedResources};
 
@@ -11,26 +12,26 @@ const SHOWN_FUNCTIONS: usize = 40;
 pub(crate) fn print_stats(machine: &Vm, summary: &Summary, seconds: f64) {
     let (heap, pauses) = (summary.heap, machine.pauses());
     let milliseconds = |nanoseconds: u64| nanoseconds as f64 / 1e6;
-    eprintln!("ticks         {:>14}", summary.ticks);
-    eprintln!("tasks         {:>14}", summary.tasks);
-    eprintln!("turns         {:>14}", summary.turns);
-    eprintln!("switches      {:>14}", summary.switches);
-    eprintln!("seconds       {seconds:>14.3}");
-    eprintln!("allocated     {:>14} bytes", heap.allocated);
-    eprintln!("peak heap     {:>14} bytes", heap.peak);
-    eprintln!("collections   {:>14}", heap.cycles);
-    eprintln!("pauses        {:>14}", pauses.count);
-    eprintln!("  all         {:>14.3} ms", milliseconds(pauses.total));
-    eprintln!("  longest     {:>14.3} ms", milliseconds(pauses.longest));
-    eprintln!("longest slice {:>14} objects", heap.longest_slice);
+    say_error!("ticks         {:>14}", summary.ticks);
+    say_error!("tasks         {:>14}", summary.tasks);
+    say_error!("turns         {:>14}", summary.turns);
+    say_error!("switches      {:>14}", summary.switches);
+    say_error!("seconds       {seconds:>14.3}");
+    say_error!("allocated     {:>14} bytes", heap.allocated);
+    say_error!("peak heap     {:>14} bytes", heap.peak);
+    say_error!("collections   {:>14}", heap.cycles);
+    say_error!("pauses        {:>14}", pauses.count);
+    say_error!("  all         {:>14.3} ms", milliseconds(pauses.total));
+    say_error!("  longest     {:>14.3} ms", milliseconds(pauses.longest));
+    say_error!("longest slice {:>14} objects", heap.longest_slice);
     let (tier, report) = machine.tier();
     if tier != Tier::Interpreter {
         match &report.refused {
-            Some(reason) => eprintln!("machine code            none: {reason}"),
+            Some(reason) => say_error!("machine code            none: {reason}"),
             None => {
-                eprintln!("machine code  {:>14} functions", report.functions);
-                eprintln!("  size        {:>14} bytes", report.bytes);
-                eprintln!("  making it   {:>14.3} ms", milliseconds(report.nanoseconds));
+                say_error!("machine code  {:>14} functions", report.functions);
+                say_error!("  size        {:>14} bytes", report.bytes);
+                say_error!("  making it   {:>14.3} ms", milliseconds(report.nanoseconds));
             }
         }
     }
@@ -39,21 +40,25 @@ pub(crate) fn print_stats(machine: &Vm, summary: &Summary, seconds: f64) {
 /// Prints the functions that have used most ticks.
 pub(crate) fn print_functions(profile: &Profile) {
     let milliseconds = |used: UsedResources| used.nanoseconds as f64 / 1e6;
-    eprintln!("\n{:>14} {:>14} {:>12} {:>12}  function", "own ticks", "with calls", "own ms", "with calls");
+    say_error!("\n{:>14} {:>14} {:>12} {:>12}  function", "own ticks", "with calls", "own ms", "with calls");
     for function in profile.functions().iter().take(SHOWN_FUNCTIONS) {
         let ProfiledFunction { name, own, total } = function;
         let (own_time, time) = (milliseconds(*own), milliseconds(*total));
-        eprintln!("{:>14} {:>14} {own_time:>12.3} {time:>12.3}  {name}", own.ticks, total.ticks);
+        say_error!("{:>14} {:>14} {own_time:>12.3} {time:>12.3}  {name}", own.ticks, total.ticks);
     }
 }
 
 /// Prints the figures of tasks.
 pub(crate) fn print_tasks(machine: &Vm) {
-    eprintln!("\n{:>14} {:>10} {:>8}  {:<9}  task", "ticks", "turns", "stack", "status");
+    say_error!("\n{:>14} {:>10} {:>8}  {:<9}  task", "ticks", "turns", "stack", "status");
     for task in machine.task_figures() {
-        eprintln!(
+        say_error!(
             "{:>14} {:>10} {:>8}  {:<9}  {}",
-            task.ticks, task.turns, task.stack, task.status, task.name
+            task.ticks,
+            task.turns,
+            task.stack,
+            task.status,
+            task.name
         );
     }
 }

@@ -1,6 +1,5 @@
 //! `eslvm`: runs ESL programs, and the REPL.
 #![forbid(unsafe_code)]
-#![allow(clippy::print_stderr, reason = "commands print")]
 
 mod durable;
 mod explore;

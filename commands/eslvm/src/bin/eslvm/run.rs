@@ -6,7 +6,7 @@ use std::path::Path;
 use esl::host::{Host, RealHost, RecordingHost};
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Instrumentation, Program, Schedule};
-use esl_command::{USAGE, complain, refuse_overwriting};
+use esl_command::{USAGE, complain, refuse_overwriting, say_error, say_error_part};
 use esl_replay::{FileRecorder, RunSetup};
 use esl_timeline::Timeline;
 use esl_vm::vm::Tier;
@@ -122,7 +122,7 @@ pub(crate) fn run(
     let default = if schedule.is_some() { Tier::Interpreter } else { Tier::Auto };
     machine.set_tier(tier.map_or(default, Tier::from));
     if let (Some(_), Some(reason)) = (tier, &machine.tier().1.refused) {
-        eprintln!("eslvm: --tier has no effect: {reason}");
+        say_error!("eslvm: --tier has no effect: {reason}");
     }
     let served = operate.begin(&mut machine, &name)?;
     if let Some((recorder, path_of_record)) = &recording {
@@ -207,7 +207,7 @@ pub(crate) fn run(
             print_functions(found);
         }
         if let (Stats::Coverage, Some(report)) = (stats, &covered) {
-            eprint!("\n{}", report.table());
+            say_error_part!("\n{}", report.table());
         }
     }
     // The process ends here: giving the memory back piece by piece would only take time.
