@@ -1,9 +1,9 @@
-//! What commands print of their own.
+//! Messages of commands.
 //!
-//! Guarantees: a closed pipe or a full disk ends nothing. A run that controls a machine goes on to its end, and the
-//! exit status states the result.
-//! Not here: what programs print (`esl_host`), and outputs that are the result of a command, whose errors are
-//! told.
+//! Guarantees: a closed pipe or a full disk ends nothing. A run that controls a machine goes on to its end, and
+//! the exit status states the result.
+//! Not here: the output of programs (`esl_host`), and files that are the result of a command, whose errors are
+//! reported.
 
 use std::fmt::Arguments;
 use std::io::Write;

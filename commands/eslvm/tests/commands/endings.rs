@@ -278,7 +278,7 @@ fn an_output_that_nobody_reads_ends_the_run_as_sigpipe_does() {
     assert!(folder.path().join("off").exists());
 }
 
-/// What commands print of their own is lost where nobody can read it; the status is as ever.
+/// Messages of commands are lost where they cannot be written; the status is as ever.
 #[test]
 #[cfg(target_os = "linux")]
 fn outputs_that_cannot_be_written_stop_no_command() {
