@@ -1,9 +1,9 @@
 //! Messages of commands.
 //!
-//! Guarantees: a closed pipe or a full disk ends nothing. A run that controls a machine goes on to its end, and
-//! the exit status states the result.
-//! Not here: the output of programs (`esl_host`), and files that are the result of a command, whose errors are
-//! reported.
+//! Guarantees: a closed pipe or a full disk ends nothing. A run that controls a machine goes on to its end,
+//! and the exit status states the result.
+//! Not here: the output of programs (`esl_host`), and files that are the result of a command, whose errors
+//! are reported.
 
 use std::fmt::Arguments;
 use std::io::Write;
