@@ -23,8 +23,6 @@ mod status_line;
 mod usage;
 mod version;
 
-use std::path::Path;
-
 use esl_bytecode::diagnostic::Severity;
 use esl_compiler::diagnostic::{Format, Renderer};
 
@@ -35,7 +33,7 @@ pub use folder::{is_test_file, sources_in};
 pub use say::{print_error, print_text};
 pub use shell::{print_completions, write_man_pages};
 pub use status_line::{StatusLine, wants_color};
-pub use usage::{Habits, parse};
+pub use usage::{Habits, command_name, parse};
 pub use version::version_of_build;
 
 /// Exit status of success.
@@ -60,12 +58,6 @@ pub fn add_modules() {
     esl_world::add_modules(esl_trees::MODULES);
     #[cfg(feature = "robots")]
     esl_world::add_modules(esl_robots::MODULES);
-}
-
-/// Returns the name of the running command, for messages.
-fn command_name() -> String {
-    let path = std::env::args_os().next().unwrap_or_default();
-    Path::new(&path).file_stem().map_or("esl".into(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Prints a message of the command itself.

@@ -1,6 +1,7 @@
 //! Command lines, and what to type instead of those that other tools have taught.
 
 use std::ffi::OsString;
+use std::path::Path;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser};
@@ -10,10 +11,27 @@ use super::{USAGE, complain};
 /// Words in place of a subcommand, and the command that does the same.
 pub type Habits = &'static [(&'static str, &'static str)];
 
+/// Returns the arguments of the running command, its name first. A build of `eslvm` that contains `eslc` runs
+/// it where its own first argument says so: `eslvm eslc check FILE`.
+pub(crate) fn arguments() -> Vec<OsString> {
+    let mut arguments: Vec<OsString> = std::env::args_os().collect();
+    if arguments.get(1).is_some_and(|first| first == "eslc") {
+        arguments.remove(0);
+    }
+    arguments
+}
+
+/// Returns the name of the running command.
+pub fn command_name() -> String {
+    let arguments = arguments();
+    let path = arguments.first().map(Path::new);
+    path.and_then(Path::file_stem).map_or("esl".into(), |name| name.to_string_lossy().into_owned())
+}
+
 /// Parses the command line. One that is wrong ends the process, after a message that says what to type, also
 /// if it begins with a word of `habits`, or with a file where `file_command` takes one.
 pub fn parse<C: Parser + CommandFactory>(file_command: &str, habits: Habits) -> C {
-    let arguments: Vec<OsString> = std::env::args_os().collect();
+    let arguments = arguments();
     let error = match C::try_parse_from(&arguments) {
         Ok(parsed) => return parsed,
         Err(error) => error,
@@ -35,7 +53,7 @@ fn meant(word: &str, file_command: &str, habits: Habits) -> Option<String> {
     if let Some((_, command)) = habits.iter().find(|(habit, _)| *habit == word) {
         return Some((*command).into());
     }
-    let path = std::path::Path::new(word);
+    let path = Path::new(word);
     let is_source =
         path.extension().is_some_and(|extension| ["esl", "eslb", "lisp"].iter().any(|end| extension == *end));
     (is_source || path.is_file()).then(|| format!("{file_command} {word}"))

@@ -55,6 +55,10 @@ const HABITS: command::Habits = &[
 fn main() -> ExitCode {
     #[cfg(unix)]
     raise_limit_of_descriptors();
+    #[cfg(feature = "eslc")]
+    if command::command_name() == "eslc" {
+        return eslc::main();
+    }
     esl_vm::allocator::return_large_blocks();
     command::add_modules();
     let status = match command::parse::<Eslvm>("eslvm run", HABITS).action {
