@@ -82,8 +82,12 @@ impl Caller {
 }
 
 impl Observer for Caller {
+    fn is_over(&self) -> bool {
+        self.is_stopped.load(Ordering::Relaxed)
+    }
+
     fn see(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>) {
-        if self.is_stopped.load(Ordering::Relaxed) {
+        if self.is_over() {
             return;
         }
         if matches!(seen, Seen::Begins { is_hidden: true, .. }) {
@@ -151,7 +155,7 @@ impl Watch {
 
 #[pymethods]
 impl Watch {
-    /// Has the function called no more, from the next turn of the run on.
+    /// Has the function called no more, and dropped.
     fn stop(&self) {
         drop(self.0.lock().unwrap_or_else(PoisonError::into_inner).take());
     }
@@ -185,8 +189,12 @@ impl Timeline {
 }
 
 impl Observer for Drawer {
+    fn is_over(&self) -> bool {
+        self.is_stopped.load(Ordering::Relaxed)
+    }
+
     fn see(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>) {
-        if !self.is_stopped.load(Ordering::Relaxed) {
+        if !self.is_over() {
             lock(&self.drawing).see(time, task, seen);
         }
     }

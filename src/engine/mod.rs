@@ -52,6 +52,7 @@ pub use looping::{Ending, Poll, Running};
 pub use operation::Operation;
 pub use patch::{ProgramDefinition, ProgramDefinitionKind};
 pub use query::QueryAnswer;
+use watch::LeftWatches;
 pub use watch::{FactWatch, WatchedFact};
 
 /// A machine with the library. Definitions last from one evaluation to the next.
@@ -71,8 +72,9 @@ pub struct Engine {
     ticks: u64,
     /// Runs the futures of operations.
     executor: Executor,
-    /// Number of watches over facts that were begun, which tells their names apart.
+    /// Number of names of watches over facts.
     watches: u64,
+    left_watches: LeftWatches,
 }
 
 impl Engine {
@@ -90,7 +92,13 @@ impl Engine {
     /// [`Error::NoMemory`], if the limit of memory leaves no room for the library.
     pub fn with(config: Config, host: Box<dyn Host + Send>) -> Result<Engine, Error> {
         let machine = program::machine(config, host)?;
-        Ok(Engine { machine, ticks: u64::MAX, executor: executor::thread(), watches: 0 })
+        Ok(Engine {
+            machine,
+            ticks: u64::MAX,
+            executor: executor::thread(),
+            watches: 0,
+            left_watches: LeftWatches::default(),
+        })
     }
 
     /// Limits the ticks (calls and turns of loops) of each evaluation.

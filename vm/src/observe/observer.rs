@@ -73,6 +73,11 @@ pub enum Seen<'a> {
 pub trait Observer: Send {
     /// Is told what happens to a task, and when, in nanoseconds.
     fn see(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>);
+
+    /// Returns whether it wants to be told nothing more: the machine drops it before the next event.
+    fn is_over(&self) -> bool {
+        false
+    }
 }
 
 /// Observers on their way to a machine, from other threads.
@@ -162,6 +167,7 @@ impl Observers {
     fn tell(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>) {
         // A clock that is read twice may seem to go back where two are mixed.
         self.latest = self.latest.max(time);
+        self.list.retain(|observer| !observer.is_over());
         for observer in &mut self.list {
             observer.see(self.latest, task, seen);
         }

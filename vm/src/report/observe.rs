@@ -16,6 +16,7 @@ impl Vm {
     /// Lets an observer watch the run from now on. It learns of the tasks that are there.
     pub fn add_observer(&mut self, observer: Box<dyn Observer>) {
         let Vm { watch, outside, scheduler, .. } = self;
+        watch.observers.list.retain(|observer| !observer.is_over());
         watch.observers.begin(&mut outside.host, scheduler);
         watch.observers.list.push(observer);
         watch.update_is_watched();
