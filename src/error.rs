@@ -83,7 +83,7 @@ pub enum Error {
         /// Name of the type in `COMMON-LISP`.
         expected: &'static str,
     },
-    /// The engine that was asked is gone.
+    /// The engine that was asked is gone, or replays a run in which this was not asked.
     Ended,
     /// The value has lists or vectors more than [`MAX_DEPTH`] levels deep.
     NestedTooDeeply,
@@ -122,7 +122,7 @@ impl fmt::Display for Error {
             Error::NestedTooDeeply => {
                 write!(f, "the value has more than {MAX_DEPTH} levels of lists or vectors within each other")
             }
-            Error::Ended => f.write_str("the engine is gone"),
+            Error::Ended => f.write_str("the engine is gone, or replays a run without this question"),
             Error::Refused(error) => error.fmt(f),
             Error::NotData(error) => error.fmt(f),
             Error::InvalidName(name) => {

@@ -5,7 +5,7 @@ use esl_bytecode::datum::{Datum, DatumKind};
 
 use super::{
     ActionId, Awaited, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, HostState, Inbox,
-    Incoming, Input, Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
+    Incoming, Input, Output, Permit, ReplayState, Right, Rights, RunCheck, Wake, WriteMode,
 };
 use crate::canary::Canary;
 
@@ -283,6 +283,10 @@ impl Host for Asked {
     #[inline]
     fn poll(&mut self, round: u64) -> Vec<Incoming> {
         self.host.poll(round)
+    }
+
+    fn replay_state(&self) -> ReplayState {
+        self.host.replay_state()
     }
 
     fn broken_output_status(&self) -> u8 {

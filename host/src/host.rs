@@ -117,6 +117,17 @@ impl From<&std::io::Error> for HostError {
     }
 }
 
+/// Whether a host replays a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReplayState {
+    /// The outside is there.
+    Live,
+    /// Recorded answers are left.
+    Replays,
+    /// The replay has diverged, or asked for more than was recorded: nothing comes any more.
+    IsOver,
+}
+
 /// The events that a host waits for beside a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Awaited {
@@ -295,6 +306,12 @@ pub trait Host {
     fn poll(&mut self, round: u64) -> Vec<Incoming> {
         let _ = round;
         self.inbox().take()
+    }
+
+    /// Returns whether this is a replay, which waits for nothing: all that can come comes by itself, in one of
+    /// the rounds to come.
+    fn replay_state(&self) -> ReplayState {
+        ReplayState::Live
     }
 
     /// Returns the exit status of a program whose standard output was closed by its reader: that of a program

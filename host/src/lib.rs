@@ -67,8 +67,8 @@ pub use function::{
     OperationFuture, definitions, unused_functions,
 };
 pub use host::{
-    Awaited, FileAnswer, FileRequest, Host, HostError, HostState, Input, Output, RunCheck, VIRTUAL_BEGINNING,
-    Wake, WriteMode,
+    Awaited, FileAnswer, FileRequest, Host, HostError, HostState, Input, Output, ReplayState, RunCheck,
+    VIRTUAL_BEGINNING, Wake, WriteMode,
 };
 pub use inbox::{Inbox, Incoming};
 pub use input::HostInput;

@@ -158,6 +158,9 @@ pub(super) struct Asking(Mutex<OpenQuestions>);
 #[derive(Default)]
 struct OpenQuestions {
     slots: BTreeMap<u64, Arc<Slot>>,
+    /// Answers to questions that are still to be asked: a replay takes the questions from its recording, and
+    /// may be ahead of the callers that ask them again.
+    early: BTreeMap<u64, Answer>,
     /// Number of questions so far.
     asked: u64,
     is_closed: bool,
@@ -173,7 +176,14 @@ impl Inbox {
     /// Hands the answer to the question with this number to the caller that waits for it.
     #[doc(hidden)]
     pub fn answer(&self, number: u64, answer: Answer) {
-        let slot = self.asking().waiting().slots.remove(&number);
+        let slot = {
+            let mut open = self.asking().waiting();
+            if number > open.asked {
+                open.early.insert(number, answer);
+                return;
+            }
+            open.slots.remove(&number)
+        };
         if let Some(slot) = slot {
             slot.fill(answer);
         }
@@ -250,13 +260,13 @@ impl Sender {
         let number = {
             let mut waiting = self.inbox().asking().waiting();
             waiting.asked += 1;
-            if waiting.is_closed {
-                slot.fill(Answer::Ended);
-            } else {
-                let number = waiting.asked;
-                waiting.slots.insert(number, slot.clone());
+            let number = waiting.asked;
+            match waiting.early.remove(&number) {
+                Some(answer) => slot.fill(answer),
+                None if waiting.is_closed => slot.fill(Answer::Ended),
+                None => _ = waiting.slots.insert(number, slot.clone()),
             }
-            waiting.asked
+            number
         };
         self.inbox().put(Incoming::Question { number, question });
         Pending { number, slot }
@@ -274,7 +284,12 @@ mod tests {
         let (first, second) = (sender.ask(Question::Tasks), sender.ask(Question::Tasks));
         assert!(first.take().is_none());
         inbox.answer(second.number(), Answer::Aborted);
-        inbox.answer(77, Answer::Aborted);
+        inbox.answer(1, Answer::Circular);
+        inbox.answer(3, Answer::TooLarge);
+        assert!(matches!(first.take(), Some(Answer::Circular)));
+        let first = sender.ask(Question::Tasks);
+        assert!(matches!(first.take(), Some(Answer::TooLarge)), "a replay has answered before");
+        let first = sender.ask(Question::Tasks);
         assert!(matches!(second.wait(), Answer::Aborted));
         let thread = std::thread::spawn(move || first.wait());
         inbox.end_answers();

@@ -98,7 +98,8 @@ impl Engine {
 
     /// Runs tasks for a portion of ticks, for a loop of the embedder's, which says what time it is. Comes
     /// back when all tasks wait; never waits itself. Timers that are due fire. Into which portions a run is
-    /// divided changes nothing in it.
+    /// divided changes nothing in it. A replay ([`ReplayHost`](crate::host::ReplayHost)) waits for nothing
+    /// either: it is busy until it ends, or diverges.
     ///
     /// ```
     /// use std::time::{Duration, Instant};
@@ -128,6 +129,9 @@ impl Engine {
         }
         if outcome == RunOutcome::Waiting && self.machine.expects_something() {
             let until = self.machine.time_to_next_timer().map(Duration::from_nanos);
+            if self.machine.replays() {
+                return Poll::Busy;
+            }
             return Poll::Idle { until: until.and_then(|time| now.checked_add(time)) };
         }
         Poll::Ended(self.ending_of(outcome))

@@ -4,6 +4,7 @@ mod depth;
 mod loops;
 mod operations;
 mod questions;
+mod replays;
 mod things;
 mod vectors;
 

@@ -5,6 +5,8 @@
 //! it does when the program asks something after the last record: a replay never goes on by itself.
 
 mod divergence;
+mod question;
+mod text;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -18,8 +20,11 @@ use crate::record::{
 };
 use crate::{
     ActionId, Awaited, Captured, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, Inbox,
-    Incoming, Input, Output, Permit, ProcessSignal, Right, Rights, RunCheck, Wake, WriteMode,
+    Incoming, Input, Output, Permit, ProcessSignal, ReplayState, Right, Rights, RunCheck, Wake, WriteMode,
 };
+
+use question::RecordedQuestions;
+use text::{asked_call, quoted, stream};
 
 pub use divergence::Divergence;
 
@@ -53,6 +58,7 @@ struct ReplayProgress {
     checks: u64,
     /// Whether the machine is to come back.
     comes_back: bool,
+    questions: RecordedQuestions,
 }
 
 /// Receives the output of a replay, piece by piece.
@@ -81,6 +87,7 @@ impl ReplayHost {
             equal: None,
             checks: 0,
             comes_back: false,
+            questions: RecordedQuestions::default(),
         };
         let replay = ReplayHost {
             progress: Arc::new(Mutex::new(progress)),
@@ -420,7 +427,7 @@ impl Host for ReplayHost {
 
     fn poll(&mut self, round: u64) -> Vec<Incoming> {
         if !self.is_shared {
-            self.inbox.take();
+            self.drop_arrivals();
         }
         {
             let mut progress = self.progress();
@@ -434,12 +441,28 @@ impl Host for ReplayHost {
                 };
             }
             let next = progress.records.get(progress.replayed).map(|noted| &noted.record);
-            if !matches!(next, Some(&Record::Received((n, _))) if n == round) {
-                self.ring_if_needed(&progress);
-                return Vec::new();
+            match next {
+                Some(&Record::Received((n, _))) if n == round => {}
+                Some(&Record::Received((n, _))) if n < round => {
+                    let recorded = format!("the arrivals of round {n}");
+                    self.diverge(&mut progress, format!("for the arrivals of round {round}"), recorded);
+                    return Vec::new();
+                }
+                _ => {
+                    self.ring_if_needed(&progress);
+                    return Vec::new();
+                }
             }
         }
         self.next_plain::<Received>("the arrivals").map_or(Vec::new(), |answer| answer.0.1)
+    }
+
+    fn replay_state(&self) -> ReplayState {
+        match self.progress().source {
+            AnswerSource::Records if !self.is_shared => ReplayState::Replays,
+            AnswerSource::Diverged(_) | AnswerSource::Over(_) if !self.is_shared => ReplayState::IsOver,
+            _ => ReplayState::Live,
+        }
     }
 
     fn check(&mut self, check: RunCheck) {
@@ -467,27 +490,6 @@ impl Host for ReplayHost {
     fn broken_output_status(&self) -> u8 {
         let answer = self.next_plain::<BrokenOutput>("for the status of a closed output");
         answer.map_or(0, |answer| answer.0)
-    }
-}
-
-/// Returns the text of a call, for a message.
-fn asked_call(call: HostCall<'_>) -> String {
-    let arguments: String = call.arguments.iter().map(|argument| format!(" {argument}")).collect();
-    format!("for a call of the host: ({}{})", call.name, quoted(arguments.as_bytes()).trim_matches('"'))
-}
-
-/// Returns the beginning of a text in quotes, for a message.
-fn quoted(bytes: &[u8]) -> String {
-    const SHOWN: usize = 40;
-    let text = String::from_utf8_lossy(bytes);
-    let more = if text.chars().nth(SHOWN).is_some() { "…" } else { "" };
-    format!("{:?}", format!("{}{more}", text.chars().take(SHOWN).collect::<String>()))
-}
-
-fn stream(output: Output) -> &'static str {
-    match output {
-        Output::Standard => "standard output",
-        Output::Error => "standard error",
     }
 }
 

@@ -3,7 +3,7 @@
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_host::{
     ActionId, Awaited, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, HostState, Inbox,
-    Incoming, Input, Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
+    Incoming, Input, Output, Permit, ReplayState, Right, Rights, RunCheck, Wake, WriteMode,
 };
 
 use super::recorder::RunRecorder;
@@ -189,6 +189,10 @@ impl<H: Host> Host for ObservedHost<H> {
 
     fn broken_output_status(&self) -> u8 {
         self.host.broken_output_status()
+    }
+
+    fn replay_state(&self) -> ReplayState {
+        self.host.replay_state()
     }
 
     fn hear_of_refusal(&mut self) {

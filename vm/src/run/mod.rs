@@ -46,7 +46,7 @@ pub(crate) use spawn::{SpawnOptions, make_task};
 pub(crate) use timers::idle;
 pub(crate) use turn::{give_turn, go_on_with_turn};
 
-use esl_host::{Awaited, Host, RunCheck};
+use esl_host::{Awaited, Host, ReplayState, RunCheck};
 
 use abort::abort_more;
 use news::expects_news;
@@ -101,13 +101,25 @@ impl Vm {
     }
 
     /// Returns whether something can still come for tasks that all wait: a time, input, or news from outside.
+    /// To a replay only that comes which was recorded.
     pub fn expects_something(&mut self) -> bool {
         let scheduler = &mut self.scheduler;
+        match self.outside.host.replay_state() {
+            ReplayState::Live => {}
+            // What ends the pause rings in each round until it comes.
+            ReplayState::Replays if !scheduler.is_paused || self.outside.inbox.is_rung() => {}
+            ReplayState::Replays | ReplayState::IsOver => return false,
+        }
         scheduler.forget_left_streams();
         scheduler.first_timer().is_some()
             || !scheduler.readers.is_empty()
             || !scheduler.writers.is_empty()
             || expects_news(self)
+    }
+
+    /// Returns whether the run is the replay of another one, which waits for nothing.
+    pub fn replays(&self) -> bool {
+        self.outside.host.replay_state() == ReplayState::Replays
     }
 
     /// Returns how far the run is.
