@@ -10,11 +10,13 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -418,6 +420,14 @@ void destroy(void *user) {
     delete static_cast<F *>(user);
 }
 
+// Calls a function with the arguments of an operation, converted to the types of its parameters.
+template <typename F, typename O, std::size_t... I>
+auto apply_to(F &function, const O &work, std::index_sequence<I...>) {
+    using tuple = typename parameters<F>::tuple;
+    (void)work;
+    return function(work.template argument<std::tuple_element_t<I, tuple>>(I)...);
+}
+
 // Work for a task of the program, which waits for its end. Ends once, on any thread; one that is destroyed has
 // failed with :OPERATION-DROPPED.
 class operation {
@@ -431,6 +441,20 @@ public:
     }
     void complete(const value &result = value()) { esl_operation_complete(object.release(), result.get()); }
     void fail(const failure &reason) { esl_operation_fail(object.release(), reason.copy_for_c()); }
+    // Waits for a future, whose value or exception ends the operation.
+    template <typename R>
+    void complete_with(std::future<R> &result) {
+        try {
+            if constexpr (std::is_void_v<R>) {
+                result.get();
+                complete();
+            } else {
+                complete(value(result.get()));
+            }
+        } catch (...) {
+            fail(failure(current_failure()));
+        }
+    }
     void report_progress(const value &progress) { esl_operation_report_progress(object.get(), progress.get()); }
     bool is_cancelled() const { return esl_operation_is_cancelled(object.get()); }
     // Has a function called when the program leaves the call. It only hands on the message.
@@ -459,6 +483,34 @@ public:
         if (status == ESL_PENDING) return std::nullopt;
         require(status, thrown);
         return value(result);
+    }
+    // The answer as a future, which is ready when the answer has come, or has the failure of the call. Some thread
+    // runs the engine meanwhile: a wait on that thread would wait for ever.
+    template <typename T = value>
+    std::future<T> future() && {
+        struct waiting {
+            reply asked;
+            std::promise<T> promise;
+        };
+        auto state = std::make_unique<waiting>(waiting{std::move(*this), {}});
+        std::future<T> result = state->promise.get_future();
+        auto call = [](void *user) {
+            auto *come = static_cast<waiting *>(user);
+            try {
+                if constexpr (std::is_void_v<T>) {
+                    come->asked.take();
+                    come->promise.set_value();
+                } else {
+                    come->promise.set_value(come->asked.take().value().template as<T>());
+                }
+            } catch (...) {
+                come->promise.set_exception(std::current_exception());
+            }
+        };
+        const esl_reply *asked = state->asked.object.get();
+        esl_failure *thrown = nullptr;
+        require(esl_reply_on_answer(asked, call, state.release(), destroy<waiting>, &thrown), thrown);
+        return result;
     }
     // Waits for the answer, on a thread other than the engine's.
     value wait() {
@@ -696,6 +748,27 @@ public:
         require(esl_define_operation(object.get(), name.c_str(), lambda_list.c_str(), documentation.c_str(), call,
                                      new F(std::move(begin)), destroy<F>, &thrown),
                 thrown);
+    }
+    // Defines an operation whose work is a std::future, which `begin` returns: define_async("drive", "(metres)", "…",
+    // [](double metres) { return std::async(std::launch::async, drive, metres); }). The arguments are converted to
+    // the types of the parameters, and the value of the future to the value of the call; its exception is the
+    // failure. A future tells nobody that it is ready, so each call has a thread that waits for it, also after the
+    // program has left the call: a device that is to stop then takes an esl::operation and `on_cancel` instead.
+    template <typename F>
+    void define_async(const std::string &name, const std::string &lambda_list, const std::string &documentation,
+                      F begin) {
+        using arguments = typename parameters<F>::tuple;
+        auto perform = [begin = std::move(begin)](operation work) mutable {
+            try {
+                auto future = apply_to(begin, work, std::make_index_sequence<std::tuple_size_v<arguments>>());
+                std::thread([work = std::move(work), future = std::move(future)]() mutable {
+                    work.complete_with(future);
+                }).detach();
+            } catch (...) {
+                work.fail(failure(current_failure()));
+            }
+        };
+        define_operation(name, lambda_list, documentation, std::move(perform));
     }
     esl::handle handle() const {
         esl_handle *result = nullptr;

@@ -60,13 +60,15 @@ impl Settings {
         Ok(unsafe { look(config) }?.0.borrow().clone())
     }
 
-    /// Returns the host of an engine, and its recording, if there is one.
-    pub(crate) fn host(&self) -> (Box<dyn Host + Send>, Option<Recording>) {
+    /// Returns the host of an engine, and what it records or replays.
+    pub(crate) fn host(&self) -> (Box<dyn Host + Send>, Memory) {
         let output = self.output.clone();
         if let Some(records) = &self.replayed {
-            let host = ReplayHost::new(records.clone());
-            let Some(output) = output else { return (Box::new(host), None) };
-            return (Box::new(host.with_screen(move |_, bytes| output.write(bytes))), None);
+            let mut host = ReplayHost::new(records.clone());
+            if let Some(output) = output {
+                host = host.with_screen(move |_, bytes| output.write(bytes));
+            }
+            return (Box::new(host.clone()), Memory::Replayed(host));
         }
         let mut host = RealHost::new(Vec::new()).with_rights(self.rights.clone());
         if self.has_virtual_time {
@@ -79,12 +81,19 @@ impl Settings {
             }));
         }
         if !self.is_recorded {
-            return (Box::new(host), None);
+            return (Box::new(host), Memory::None);
         }
         let host = RecordingHost::new(host);
         let recording = host.recording();
-        (Box::new(host), Some(recording))
+        (Box::new(host), Memory::Recorded(recording))
     }
+}
+
+/// What an engine records or replays.
+pub(crate) enum Memory {
+    None,
+    Recorded(Recording),
+    Replayed(ReplayHost),
 }
 
 /// Creates settings with the defaults.

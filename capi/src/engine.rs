@@ -5,15 +5,14 @@ use std::sync::{Mutex, MutexGuard, OnceLock, TryLockError};
 use std::time::Instant;
 
 use esl::engine::{Ending, Poll};
-use esl::host::Recording;
 use esl::{Data, Engine, Error};
 
 use crate::border::{guarded, hand, look, store, take, text};
-use crate::config::{Settings, esl_config};
+use crate::config::{Memory, Settings, esl_config};
 use crate::failure::{Fault, esl_failure};
 use crate::fork::Process;
 use crate::reply::{AwaitedAnswer, esl_reply};
-use crate::status::esl_status::{self, ESL_BUSY, ESL_PANIC};
+use crate::status::esl_status::{self, ESL_BUSY, ESL_DIVERGED, ESL_PANIC};
 use crate::value::{esl_value, values};
 use crate::wakeup::Wakeup;
 
@@ -21,7 +20,7 @@ use crate::wakeup::Wakeup;
 /// returns `ESL_BUSY`. Other threads reach the run by handles.
 pub struct esl_engine {
     engine: Mutex<Engine>,
-    pub(crate) recording: Option<Recording>,
+    pub(crate) memory: Memory,
     process: Process,
     wakeup: OnceLock<Wakeup>,
 }
@@ -86,6 +85,25 @@ impl esl_engine {
     }
 }
 
+impl esl_engine {
+    /// Returns the fault of a replay that has done something else than the recorded run.
+    ///
+    /// # Errors
+    /// That fault.
+    fn check_replay(&self) -> Result<(), Fault> {
+        let Memory::Replayed(host) = &self.memory else { return Ok(()) };
+        let text = match (host.divergence(), host.asked_at_end()) {
+            (Some(divergence), _) => divergence.to_string(),
+            (None, Some(asked)) => format!("the recording is at its end, and the program asks {asked}"),
+            (None, None) => return Ok(()),
+        };
+        Err(Fault::new(
+            ESL_DIVERGED,
+            format!("{text}; give the engine the definitions and texts of the recorded one"),
+        ))
+    }
+}
+
 fn progress(ending: Ending) -> esl_progress {
     let (state, exit_status) = match ending {
         Ending::Done => (ESL_DONE, 0),
@@ -112,15 +130,12 @@ pub unsafe extern "C" fn esl_engine_new(
         guarded(failure, || {
             let settings = Settings::of(config)?;
             let process = Process::this();
-            let (host, recording) = settings.host();
+            let (host, memory) = settings.host();
             let mut made = Engine::with(settings.machine.clone(), host)?;
             if let Some(ticks) = settings.ticks {
                 made = made.with_ticks(ticks);
             }
-            hand(
-                engine,
-                esl_engine { engine: Mutex::new(made), recording, process, wakeup: OnceLock::new() },
-            );
+            hand(engine, esl_engine { engine: Mutex::new(made), memory, process, wakeup: OnceLock::new() });
             Ok(())
         })
     }
@@ -186,7 +201,11 @@ unsafe fn evaluate(
     // SAFETY: each pointer is null, or to what C holds and lends.
     unsafe {
         guarded(failure, || {
-            let data = evaluation(&mut *esl_engine::lock(engine)?)??;
+            let data = evaluation(&mut *esl_engine::lock(engine)?)?;
+            if data.is_err() {
+                look(engine)?.check_replay()?;
+            }
+            let data = data?;
             hand(value, esl_value(data));
             Ok(())
         })
@@ -288,7 +307,7 @@ pub unsafe extern "C" fn esl_run(
         guarded(failure, || {
             let ending = esl_engine::lock(engine)?.run();
             store(progress, self::progress(ending));
-            Ok(())
+            look(engine)?.check_replay()
         })
     }
 }
@@ -330,8 +349,9 @@ pub unsafe extern "C" fn esl_poll(
                     _ => guard.wake_when_ready(wakeup.waker()),
                 }
             }
+            let is_over = !matches!(read.state, ESL_RUNNING | ESL_WAITING);
             store(progress, read);
-            Ok(())
+            if is_over { look(engine)?.check_replay() } else { Ok(()) }
         })
     }
 }

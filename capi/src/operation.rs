@@ -22,8 +22,8 @@ pub struct esl_operation(Operation);
 pub type esl_operation_function =
     Option<unsafe extern "C" fn(user: *mut c_void, operation: *mut esl_operation)>;
 
-/// A function that is told something about an operation. It is called on the thread of the engine, and only
-/// hands on the message. It neither ends the operation nor uses the engine.
+/// A function that is told something about an operation or a reply. It is called on the thread of the engine,
+/// and only hands on the message. It neither ends the operation nor uses the engine.
 pub type esl_notice_function = Option<unsafe extern "C" fn(user: *mut c_void)>;
 
 /// Defines a function whose calls are operations, as `esl_define` defines functions.

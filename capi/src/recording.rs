@@ -5,7 +5,7 @@ use std::sync::Arc;
 use esl::host::NotedRecord;
 
 use crate::border::{freeing, guarded, hand, look, take};
-use crate::config::esl_config;
+use crate::config::{Memory, esl_config};
 use crate::engine::esl_engine;
 use crate::failure::{Fault, esl_failure};
 use crate::status::esl_status::{self, ESL_INVALID_ARGUMENT};
@@ -29,7 +29,9 @@ pub unsafe extern "C" fn esl_config_set_recording(
 
 /// Has engines replay a recording, which they copy: they call neither functions nor operations of the
 /// embedder, ask no clock, and write nothing, but do the same as the recorded engine if they are given the
-/// same definitions and texts. `esl_engine_canary` tells whether they did.
+/// same definitions and texts. `esl_engine_canary` tells whether they did; a call returns `ESL_DIVERGED` when
+/// they ask for something else. Such an engine waits for nothing: what came from outside comes again by
+/// itself, so other threads need not send it. A question to it that was not recorded ends with `ESL_ENDED`.
 ///
 /// # Safety
 /// `config` is settings and `recording` a recording; `failure` is a place that can be written, or null.
@@ -63,7 +65,7 @@ pub unsafe extern "C" fn esl_engine_recording(
     unsafe {
         guarded(failure, || {
             let guard = esl_engine::lock(engine)?;
-            let Some(kept) = &look(engine)?.recording else {
+            let Memory::Recorded(kept) = &look(engine)?.memory else {
                 let message = "the engine keeps no recording: make it with `esl_config_set_recording`";
                 return Err(Fault::new(ESL_INVALID_ARGUMENT, message));
             };

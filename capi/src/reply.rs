@@ -1,6 +1,9 @@
 //! Answers to come.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::ffi::c_void;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Wake, Waker};
 
 use esl::Data;
 use esl::engine::{QueryAnswer, Reply};
@@ -8,6 +11,8 @@ use esl::engine::{QueryAnswer, Reply};
 use crate::border::{freeing, guarded, hand, look, take};
 use crate::failure::{Fault, esl_failure};
 use crate::fork::Process;
+use crate::function::{UserData, esl_destructor, no_callback};
+use crate::operation::esl_notice_function;
 use crate::status::esl_status::{self, ESL_PENDING};
 use crate::value::esl_value;
 
@@ -28,8 +33,40 @@ pub(crate) enum AwaitedAnswer {
     Truth(Reply<bool>),
     Count(Reply<i64>),
     Facts(Reply<Vec<QueryAnswer>>),
+    /// The answer has come, and waits to be taken.
+    Come(Result<Data, esl::Error>),
     /// The answer was taken.
     Taken,
+}
+
+/// Has the waker woken when the answer of a reply has come, or returns the answer.
+fn poll<T>(
+    reply: &mut Reply<T>,
+    waker: &Waker,
+    data: impl FnOnce(T) -> Data,
+) -> Option<Result<Data, esl::Error>> {
+    match Pin::new(reply).poll(&mut Context::from_waker(waker)) {
+        Poll::Ready(result) => Some(result.map(data)),
+        Poll::Pending => None,
+    }
+}
+
+/// A function of C that is called once, when an answer has come.
+struct Notice(Mutex<Option<NoticeOfC>>);
+
+struct NoticeOfC {
+    function: unsafe extern "C" fn(user: *mut c_void),
+    user: UserData,
+}
+
+impl Wake for Notice {
+    fn wake(self: Arc<Notice>) {
+        let notice = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(NoticeOfC { function, user }) = notice {
+            // SAFETY: the embedder has given the function for this pointer, and it is called once.
+            unsafe { function(user.pointer) };
+        }
+    }
 }
 
 /// Returns a list of association lists of variables, which are keywords, and values.
@@ -44,12 +81,25 @@ impl AwaitedAnswer {
         esl_reply(Mutex::new(self), Process::this())
     }
 
+    /// Has the waker woken when the answer has come. Returns whether it has come already.
+    fn wake_when_come(&mut self, waker: &Waker) -> bool {
+        let come = match self {
+            AwaitedAnswer::Value(reply) => poll(reply, waker, |data| data),
+            AwaitedAnswer::Truth(reply) => poll(reply, waker, Data::boolean),
+            AwaitedAnswer::Count(reply) => poll(reply, waker, Data::Integer),
+            AwaitedAnswer::Facts(reply) => poll(reply, waker, data_of),
+            AwaitedAnswer::Come(_) | AwaitedAnswer::Taken => return true,
+        };
+        come.map(|result| *self = AwaitedAnswer::Come(result)).is_some()
+    }
+
     fn take(&self) -> Option<Result<Data, esl::Error>> {
         match self {
             AwaitedAnswer::Value(reply) => reply.take(),
             AwaitedAnswer::Truth(reply) => reply.take().map(|result| result.map(Data::boolean)),
             AwaitedAnswer::Count(reply) => reply.take().map(|result| result.map(Data::Integer)),
             AwaitedAnswer::Facts(reply) => reply.take().map(|result| result.map(data_of)),
+            AwaitedAnswer::Come(result) => Some(result.clone()),
             AwaitedAnswer::Taken => Some(Err(esl::Error::Ended)),
         }
     }
@@ -60,6 +110,7 @@ impl AwaitedAnswer {
             AwaitedAnswer::Truth(reply) => reply.wait().map(Data::boolean),
             AwaitedAnswer::Count(reply) => reply.wait().map(Data::Integer),
             AwaitedAnswer::Facts(reply) => reply.wait().map(data_of),
+            AwaitedAnswer::Come(result) => result,
             AwaitedAnswer::Taken => Err(esl::Error::Ended),
         }
     }
@@ -111,6 +162,40 @@ pub unsafe extern "C" fn esl_reply_wait(
             let mut answer = look(reply)?.answer();
             let data = std::mem::replace(&mut *answer, AwaitedAnswer::Taken).wait().map_err(Fault::from)?;
             hand(value, esl_value(data));
+            Ok(())
+        })
+    }
+}
+
+/// Has `function` called once, when the answer has come or the engine is gone; at once if it has come
+/// already. `esl_reply_take` then has the answer. One function at a time: a second one replaces the first. It
+/// is called on the thread of the engine, while no task runs: it uses replies and handles only, and may free
+/// this reply. `user` is freed after the call; with a status other than `ESL_OK` at once.
+///
+/// # Safety
+/// `reply` is a reply; `function` and `destructor` can be called with `user` on any thread; `failure` is a
+/// place that can be written, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_reply_on_answer(
+    reply: *const esl_reply,
+    function: esl_notice_function,
+    user: *mut c_void,
+    destructor: esl_destructor,
+    failure: *mut *mut esl_failure,
+) -> esl_status {
+    let user = UserData::new(user, destructor);
+    // SAFETY: each pointer is null, or to what C holds and lends; `function` gets the pointer that came with
+    // it.
+    unsafe {
+        guarded(failure, || {
+            let function = function.ok_or_else(no_callback)?;
+            look(reply)?.1.check()?;
+            let notice = Notice(Mutex::new(Some(NoticeOfC { function, user })));
+            let waker = Waker::from(Arc::new(notice));
+            // The function may take the answer, or free the reply: the lock is let go before.
+            if look(reply)?.answer().wake_when_come(&waker) {
+                waker.wake();
+            }
             Ok(())
         })
     }

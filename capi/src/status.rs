@@ -37,10 +37,13 @@ pub enum esl_status {
     ESL_BUSY = 12,
     /// An input is full, and its rule is that senders wait.
     ESL_FULL = 13,
-    /// The engine is gone.
+    /// The engine is gone, or replays a run without this question.
     ESL_ENDED = 14,
     /// The program has asked to end; the argument of the failure is the status.
     ESL_PROGRAM_EXITED = 16,
+    /// The engine replays a recording, and does something else than the recorded engine did. The message says
+    /// what.
+    ESL_DIVERGED = 17,
     /// A fault of ESL itself. The message has what to report.
     ESL_PANIC = 15,
 }
@@ -94,6 +97,7 @@ impl esl_status {
             ESL_FULL => c":FULL",
             ESL_ENDED => c":ENDED",
             ESL_PROGRAM_EXITED => c":EXITED",
+            ESL_DIVERGED => c":DIVERGED",
             ESL_PANIC => c":PANIC",
         }
     }

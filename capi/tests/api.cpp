@@ -1,6 +1,7 @@
 // What the C++ API promises: each check prints its line if it does not hold.
 #include "esl.hpp"
 
+#include <future>
 #include <iostream>
 #include <thread>
 
@@ -175,6 +176,78 @@ static void operations() {
     CHECK(cause_of([&] { engine.eval("(lose)"); }) == ":OPERATION-DROPPED");
 }
 
+static void futures() {
+    esl::engine engine;
+    engine.define_async("survey", "(metres &optional name)", "Looks.",
+                        [](double metres, std::optional<std::string> name) {
+                            return std::async(std::launch::async, [=]() -> std::vector<double> {
+                                if (metres > 10) throw esl::failure("obstacle", {7});
+                                if (name) throw std::runtime_error(*name + " is dark");
+                                return {metres, 2 * metres};
+                            });
+                        });
+    engine.define_async("halt", "()", "Stops.", [] { return std::async(std::launch::async, [] {}); });
+    CHECK(engine.eval("(list (survey 3) (halt))").print() == "(#(3.0 6.0) NIL)");
+    CHECK(cause_of([&] { engine.eval("(survey 50)"); }) == ":OBSTACLE");
+    CHECK(cause_of([&] { engine.eval("(survey :far)"); }) == ":TYPE-ERROR");
+    try {
+        engine.eval("(survey 3 \"the ridge\")");
+        CHECK(false);
+    } catch (const esl::failure &thrown) {
+        CHECK(std::string(thrown.what()).find("the ridge is dark") != std::string::npos);
+    }
+    engine.eval("(progn (define-input over) (defun double (n) (* 2 n)))");
+    esl::handle handle = engine.handle();
+    std::thread other([handle]() mutable {
+        std::future<int> doubled = handle.call("double", {21}).future<int>();
+        std::future<esl::value> failed = handle.call("fail", {esl::value::keyword("lost")}).future();
+        std::future<std::string> mistaken = handle.call("double", {1}).future<std::string>();
+        std::future<void> over = handle.spawn("sleep", {0.001}).result().future<void>();
+        CHECK(doubled.get() == 42);
+        CHECK(cause_of([&] { failed.get(); }) == ":LOST");
+        CHECK(cause_of([&] { mistaken.get(); }) == ":TYPE-ERROR");
+        over.get();
+        handle.signal("over");
+    });
+    engine.eval("(wait-for-event over)");
+    other.join();
+    esl::reply come = engine.begin("(list 1)");
+    engine.run();
+    std::future<esl::value> ready = std::move(come).future();
+    CHECK(ready.wait_for(std::chrono::seconds(0)) == std::future_status::ready && ready.get().print() == "(1)");
+    std::future<esl::value> never;
+    {
+        esl::engine brief;
+        never = brief.begin("(sleep 1000)").future();
+        CHECK(never.wait_for(std::chrono::seconds(0)) == std::future_status::timeout);
+    }
+    CHECK(cause_of([&] { never.get(); }) == ":ENDED");
+}
+
+static void divergence() {
+    esl::settings settings;
+    settings.is_recorded = true;
+    esl::engine engine(settings);
+    engine.eval("(get-universal-time)");
+    settings.replayed = engine.recording();
+    esl::engine replay(settings);
+    esl::reply answer = replay.begin("(wait-for-event (make-event))");
+    CHECK(replay.poll(1000).state == ESL_DONE);
+    CHECK(cause_of([&] { answer.wait(); }) == ":ENDED");
+    // An operation of which the recording has nothing.
+    esl::engine other(settings);
+    other.define_operation("wait", "()", "Waits.", [](esl::operation) { CHECK(false); });
+    try {
+        other.eval("(wait)");
+        CHECK(false);
+    } catch (const esl::failure &thrown) {
+        CHECK(thrown.status() == ESL_DIVERGED);
+        CHECK(std::string(thrown.what()).find("the replay has diverged at record") != std::string::npos);
+    }
+    CHECK(cause_of([&] { other.run(); }) == ":DIVERGED");
+    CHECK(cause_of([&] { other.poll(1000); }) == ":DIVERGED");
+}
+
 static void threads() {
     esl::engine engine(esl::settings{});
     engine.eval("(progn (define-input commands :capacity 9) (defun double (n) (* 2 n)))");
@@ -205,6 +278,8 @@ int main() {
     json();
     watching();
     operations();
+    futures();
+    divergence();
     threads();
     CHECK(cause_of([] { esl::settings s; s.allow = {"fly"}; esl::engine engine(s); }) == ":INVALID-ARGUMENT");
     std::cout << faults << " faults" << std::endl;

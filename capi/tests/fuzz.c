@@ -106,6 +106,8 @@ static void *work(void *argument) {
     return NULL;
 }
 
+static void come(void *user) { *(long *)user += 0; }
+
 static void cancel(void *user) { *(long *)user += 0; }
 
 static void begin(void *user, esl_operation *operation) {
@@ -229,7 +231,8 @@ static void one_call(void) {
         if (below(4) == 0) esl_handle_stop(handle);
         break;
     }
-    case 31: case 32: status = esl_reply_take(ANY(esl_reply), &value, &failure); break;
+    case 31: status = esl_reply_take(ANY(esl_reply), &value, &failure); break;
+    case 32: status = esl_reply_on_answer(ANY(esl_reply), below(9) ? come : NULL, &dropped, drop, &failure); break;
     case 33: status = esl_value_of_json(below(2) ? "{\"a\": [1, 2.5]}" : TEXT, &value, &failure); break;
     case 34: {
         char *json = NULL;
@@ -272,7 +275,7 @@ static void one_call(void) {
     default: {
         int descriptor = -1;
         if (below(4)) status = esl_wakeup_fd(ANY(esl_engine), &descriptor, &failure);
-        else status = esl_config_set_replay(ANY(esl_config), NULL, &failure); /* A replay of other calls may wait. */
+        else status = esl_config_set_replay(ANY(esl_config), ANY(esl_recording), &failure);
     }
     }
     check(status, failure);
