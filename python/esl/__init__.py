@@ -19,7 +19,7 @@
 import os
 
 from . import _esl
-from ._esl import Handle, ProgramObject
+from ._esl import Handle, ProgramObject, Recording
 from .display import Event, TaskInfo, Tasks, Timeline
 from .engine import Definition, Engine
 from .errors import (
@@ -28,6 +28,7 @@ from .errors import (
     CompileError,
     Deadlocked,
     Diagnostic,
+    Diverged,
     Ended,
     Error,
     Exited,
@@ -54,6 +55,7 @@ __all__ = [
     "Deadlocked",
     "Definition",
     "Diagnostic",
+    "Diverged",
     "Dotted",
     "Ended",
     "Engine",
@@ -74,6 +76,7 @@ __all__ = [
     "Object",
     "Place",
     "ProgramObject",
+    "Recording",
     "Replay",
     "RunResult",
     "Stopped",

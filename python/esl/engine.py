@@ -64,6 +64,9 @@ class Engine:
     :param seed: seed of random numbers
     :param budget: ticks (calls and turns of loops) of the whole run
     :param output: function called with the texts that programs write, in place of the standard streams
+    :param record: keeps a recording, which `recording()` returns
+    :param replay: a recording to be repeated, without clocks, functions of Python or other outside. The engine gets the
+        same definitions and texts as the recorded one; another course is `esl.Diverged`
     """
 
     def __init__(
@@ -75,9 +78,18 @@ class Engine:
         seed: int = 0,
         budget: Optional[int] = None,
         output: Optional[Callable[[str], object]] = None,
+        record: bool = False,
+        replay: Optional[_esl.Recording] = None,
     ) -> None:
         self._machine = _esl.Engine(
-            clock=clock, allow=list(allow), memory=size_of(memory), seed=seed, budget=budget, output=output
+            clock=clock,
+            allow=list(allow),
+            memory=size_of(memory),
+            seed=seed,
+            budget=budget,
+            output=output,
+            record=record,
+            replay=replay,
         )
         self._shared_handle: Optional[_esl.Handle] = None
         self._loop: Optional[Loop] = None
@@ -235,6 +247,17 @@ class Engine:
     def timeline(self) -> Timeline:
         """Begins a drawing of the run, which a notebook shows: it ends with its `with` block."""
         return Timeline(self._machine.timeline())
+
+    # ---- recording
+
+    def recording(self) -> _esl.Recording:
+        """Returns what was recorded so far, for `esl.Engine(replay=…)`. The engine is one of `esl.Engine(record=True)`."""
+        return self._machine.recording()
+
+    @property
+    def canary(self) -> int:
+        """A hash of the course of the run so far: that of a recorded run and of its replay is the same."""
+        return self._machine.canary
 
     # ---- running
 

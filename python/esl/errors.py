@@ -135,6 +135,10 @@ class Stopped(Error):
     """The run was stopped by a handle."""
 
 
+class Diverged(Error):
+    """The engine replays a recording, and does something else than the recorded engine did."""
+
+
 class NoMemory(Error):
     """The limit of memory leaves no room."""
 

@@ -22,6 +22,7 @@ use crate::failure::{busy, exception, of_error, of_text};
 use crate::handle::{Handle, Task, all_data};
 use crate::output::{Output, screen};
 use crate::process::{Process, detached};
+use crate::recording::{Memory, Recording};
 use crate::value::to_python;
 use crate::watching::{Caller, Observation, Timeline, Watch};
 
@@ -80,6 +81,7 @@ pub(crate) struct Engine {
     engine: Mutex<Owned>,
     bell: Arc<Bell>,
     wakeup: Mutex<Option<Wakeup>>,
+    memory: Memory,
     process: Process,
     /// Functions of Python that the machine holds, for the collector of Python.
     functions: Mutex<Vec<Weak<Py<PyAny>>>>,
@@ -163,13 +165,19 @@ impl Engine {
                 let (source, text) = text;
                 return match result {
                     Ok(data) => to_python(py, &data),
-                    Err(error) => Err(of_text(py, engine.diagnose(error), source, text)),
+                    Err(error) => {
+                        let of_text = |error| of_text(py, engine.diagnose(error), source, text);
+                        Err(self.memory.exception(py, error, of_text))
+                    }
                 };
             }
             match polled {
                 Poll::Busy => {}
                 Poll::Idle { until } => detached(py, || self.wait(engine, until)),
-                Poll::Ended(ending) => return Err(of_ending(py, ending)),
+                Poll::Ended(ending) => {
+                    self.memory.check_replay(py)?;
+                    return Err(of_ending(py, ending));
+                }
             }
             if let Err(interrupt) = py.check_signals() {
                 detached(py, || engine.end());
@@ -220,7 +228,11 @@ pub(crate) fn rights(allow: &[String]) -> PyResult<Rights> {
 #[pymethods]
 impl Engine {
     #[new]
-    #[pyo3(signature = (*, clock = "real", allow = Vec::new(), memory = None, seed = 0, budget = None, output = None))]
+    #[pyo3(signature = (
+        *, clock = "real", allow = Vec::new(), memory = None, seed = 0, budget = None, output = None, record = false,
+        replay = None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "they are keyword arguments in Python")]
     fn new(
         py: Python<'_>,
         clock: &str,
@@ -229,6 +241,8 @@ impl Engine {
         seed: u64,
         budget: Option<u64>,
         output: Option<Py<PyAny>>,
+        record: bool,
+        replay: Option<Py<Recording>>,
     ) -> PyResult<Engine> {
         let host = RealHost::new(Vec::new()).with_rights(rights(&allow)?);
         let host = match clock {
@@ -241,18 +255,17 @@ impl Engine {
         };
         let output = output.map(Arc::new);
         let functions = output.iter().map(Arc::downgrade).collect();
-        let host = match output {
-            Some(function) => host.with_screen(screen(Output::new(function))),
-            None => host,
-        };
+        let screen = output.map(|function| screen(Output::new(function)));
+        let (host, remembers) = Memory::host(host, screen, record, replay.as_ref().map(Py::get))?;
         let memory = memory.unwrap_or(Config::DEFAULT.memory);
         let config = Config { memory, seed, budget, ..Config::default() };
-        let engine = py.detach(|| esl::Engine::with(config, Box::new(host)));
+        let engine = py.detach(|| esl::Engine::with(config, host));
         let engine = Mutex::new(Owned(Some(engine.map_err(|error| of_error(py, error))?)));
         Ok(Engine {
             engine,
             bell: Arc::default(),
             wakeup: Mutex::default(),
+            memory: remembers,
             process: Process::current(),
             functions: Mutex::new(functions),
         })
@@ -358,9 +371,24 @@ impl Engine {
                 let wait = until.map(|until| until.saturating_duration_since(Instant::now()).as_secs_f64());
                 (false, wait, None)
             }
-            Poll::Ended(Ending::Done | Ending::Exited(_)) => (false, None, None),
-            Poll::Ended(ending) => (false, None, Some(of_ending(py, ending))),
+            Poll::Ended(ending) => {
+                let failed = !matches!(ending, Ending::Done | Ending::Exited(_));
+                let diverged = self.memory.check_replay(py).err();
+                (false, None, diverged.or_else(|| failed.then(|| of_ending(py, ending))))
+            }
         })
+    }
+
+    /// What was recorded so far.
+    fn recording(&self) -> PyResult<Recording> {
+        let _guard = self.lock()?;
+        self.memory.recording()
+    }
+
+    /// A hash of the course of the run so far.
+    #[getter]
+    fn canary(&self) -> PyResult<u64> {
+        Ok(self.lock()?.canary())
     }
 
     /// Returns a file descriptor that becomes readable when something has come for the engine.

@@ -9,6 +9,7 @@
 //! | `handle` | other threads, and answers to come |
 //! | `watching` | events of tasks, changes of facts, drawings |
 //! | `program` | whole programs: diagnostics, tests, recordings |
+//! | `recording` | recordings of engines |
 //! | `output` | the output of programs |
 //! | `process` | copies of the process |
 //!
@@ -25,6 +26,7 @@ mod handle;
 mod output;
 mod process;
 mod program;
+mod recording;
 mod value;
 mod watching;
 
@@ -43,6 +45,8 @@ mod _esl {
     use super::process::{note_exit, note_fork};
     #[pymodule_export]
     use super::program::{Tests, check, replay, run};
+    #[pymodule_export]
+    use super::recording::Recording;
     #[pymodule_export]
     use super::value::ProgramObject;
     #[pymodule_export]

@@ -48,7 +48,7 @@ impl Output {
 }
 
 /// The screen of a host.
-type Screen = Box<dyn FnMut(&[u8]) -> io::Result<()> + Send>;
+pub(crate) type Screen = Box<dyn FnMut(&[u8]) -> io::Result<()> + Send>;
 
 /// Returns the screen of a host that writes to a function.
 pub(crate) fn screen(mut output: Output) -> Screen {

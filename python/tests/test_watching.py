@@ -1,9 +1,11 @@
 """Watching and changing a run: output, events, facts, patches, definitions, diagnostics, recordings."""
 
 import asyncio
+import gc
 import io
 import textwrap
 import time
+import weakref
 
 import pytest
 
@@ -219,6 +221,95 @@ def test_recordings(tmp_path):
         esl.replay(program)
     with pytest.raises(FileNotFoundError):
         esl.run(tmp_path / "nothing.esl")
+
+
+def recorded_roll(replay=None):
+    texts = []
+    engine = esl.Engine(output=texts.append, record=replay is None, replay=replay)
+
+    @engine.function
+    def roll():
+        assert replay is None, "a replay does not call it"
+        return 4
+
+    @engine.operation
+    def drive(metres):
+        assert replay is None, "a replay does not begin it"
+        return 2 * metres
+
+    return engine, texts
+
+
+MISSION = "(progn (print (list (roll) (drive 3) (random 1000) (now))) (sleep 0.01) (get-universal-time))"
+
+
+def test_a_recording_of_an_engine_is_replayed():
+    engine, texts = recorded_roll()
+    time = engine.eval(MISSION)
+    recording = engine.recording()
+    assert len(recording) > 5 and "records" in repr(recording)
+    replay, texts_again = recorded_roll(recording)
+    assert replay.eval(MISSION) == time
+    assert texts_again == texts and replay.canary == engine.canary
+
+
+def test_a_recording_in_a_loop_is_replayed():
+    async def main(replay=None):
+        engine = esl.Engine(record=replay is None, replay=replay)
+
+        @engine.operation
+        async def drive(metres):
+            await asyncio.sleep(0.003)
+            return metres
+
+        async with engine.running():
+            spot = await engine.eval("(progn (sleep 0.002) (list (drive 3) (now)))")
+        return engine, spot
+
+    engine, spot = asyncio.run(asyncio.wait_for(main(), 20))
+    replay, again = asyncio.run(asyncio.wait_for(main(engine.recording()), 20))
+    assert again == spot and replay.canary == engine.canary
+
+
+def test_a_replay_with_other_calls_is_refused():
+    engine, _ = recorded_roll()
+    engine.eval(MISSION)
+    engine.call("identity", 1)
+    recording = engine.recording()
+    for other in [
+        lambda replay: replay.eval("(drive 5)"),
+        lambda replay: (replay.eval(MISSION), replay.call("identity", 2)),
+    ]:
+        replay, _ = recorded_roll(recording)
+        with pytest.raises(esl.Diverged, match="the replay has diverged at record"):
+            other(replay)
+    replay, _ = recorded_roll(recording)
+    replay.eval(MISSION)
+    assert replay.call("identity", 1) == 1
+    with pytest.raises(esl.Diverged, match="no such evaluation"):
+        replay.eval("(sleep 1000)")
+    with pytest.raises(RuntimeError, match="record=True"):
+        replay.recording()
+    with pytest.raises(ValueError, match="not both"):
+        esl.Engine(record=True, replay=recording)
+
+
+def test_what_has_watched_leaves_nothing(engine):
+    class Function:
+        def __call__(self, *_):
+            pass
+
+    for watches in [lambda f: engine.facts.watch("(at ?place)", f), lambda f: engine.observe(f)]:
+        functions = []
+        for _ in range(20):
+            function = Function()
+            functions.append(weakref.ref(function))
+            with watches(function):
+                engine.eval("(assert '(at ridge))")
+        del function
+        engine.eval("(retract '(at ridge))")
+        gc.collect()
+        assert [reference() for reference in functions] == [None] * 20
 
 
 def test_tasks(engine):
