@@ -94,6 +94,19 @@ pub unsafe extern "C" fn esl_define(
     }
 }
 
+/// Takes an object that C hands over, if it does.
+///
+/// # Safety
+/// As [`take`].
+unsafe fn handed<T>(pointer: *mut T) -> Option<Box<T>> {
+    // The fault of a null pointer has a text, which takes longer than the rest of a call.
+    if pointer.is_null() {
+        return None;
+    }
+    // SAFETY: the caller promises that the pointer is valid.
+    unsafe { take(pointer) }.ok()
+}
+
 /// Calls a function that C implements.
 fn call_function(
     function: unsafe extern "C" fn(
@@ -110,11 +123,10 @@ fn call_function(
     // SAFETY: the embedder has given the function for this pointer; the arguments live until it returns.
     let failure = unsafe { function(user.pointer, arguments.as_ptr(), arguments.len(), &raw mut result) };
     // SAFETY: the function hands over what it returns.
-    let (failure, result) = unsafe { (take(failure), take(result)) };
+    let (failure, result) = unsafe { (handed(failure), handed(result)) };
     match (failure, result) {
-        (Ok(failure), _) => Err(failure.to_engine()),
-        (Err(_), Ok(value)) => Ok(value.0),
-        (Err(_), Err(_)) => Ok(Data::Nil),
+        (Some(failure), _) => Err(failure.to_engine()),
+        (None, result) => Ok(result.map_or(Data::Nil, |value| value.0)),
     }
 }
 

@@ -128,12 +128,21 @@ pub enum Answer {
 /// The place where an answer is waited for.
 #[derive(Default)]
 struct Slot {
-    state: Mutex<(Option<Answer>, Option<Waker>)>,
+    state: Mutex<SlotState>,
+    /// Notified when the answer has come and a thread waits.
     ready: Condvar,
 }
 
+#[derive(Default)]
+struct SlotState {
+    answer: Option<Answer>,
+    waker: Option<Waker>,
+    /// Whether a thread waits. A notification without one is a call of the system too.
+    is_awaited: bool,
+}
+
 impl Slot {
-    fn state(&self) -> MutexGuard<'_, (Option<Answer>, Option<Waker>)> {
+    fn state(&self) -> MutexGuard<'_, SlotState> {
         // The state is whole at every moment, so a panic elsewhere does not corrupt it.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -141,9 +150,11 @@ impl Slot {
     fn fill(&self, answer: Answer) {
         let waker = {
             let mut state = self.state();
-            state.0 = Some(answer);
-            self.ready.notify_all();
-            state.1.take()
+            state.answer = Some(answer);
+            if state.is_awaited {
+                self.ready.notify_all();
+            }
+            state.waker.take()
         };
         if let Some(waker) = waker {
             waker.wake();
@@ -225,16 +236,19 @@ impl Pending {
     pub fn wait(self) -> Answer {
         let mut state = self.slot.state();
         loop {
-            match state.0.take() {
+            match state.answer.take() {
                 Some(answer) => return answer,
-                None => state = self.slot.ready.wait(state).unwrap_or_else(PoisonError::into_inner),
+                None => {
+                    state.is_awaited = true;
+                    state = self.slot.ready.wait(state).unwrap_or_else(PoisonError::into_inner);
+                }
             }
         }
     }
 
     /// Returns the answer if it has come.
     pub fn take(&self) -> Option<Answer> {
-        self.slot.state().0.take()
+        self.slot.state().answer.take()
     }
 }
 
@@ -243,10 +257,10 @@ impl Future for Pending {
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Answer> {
         let mut state = self.slot.state();
-        match state.0.take() {
+        match state.answer.take() {
             Some(answer) => Poll::Ready(answer),
             None => {
-                state.1 = Some(context.waker().clone());
+                state.waker = Some(context.waker().clone());
                 Poll::Pending
             }
         }

@@ -84,6 +84,10 @@ impl Vm {
         let packages = self.names.packages();
         let found = packages.named(package).and_then(|package| packages.find(package, name));
         let symbol = found.map_or_else(|| Symbol::new(&package.into(), name), |(symbol, _)| symbol);
+        // A symbol that is there needs no memory; a new one may need a collection.
+        if let Ok(object) = self.names.intern(&mut self.heap, &symbol) {
+            return Some(object);
+        }
         let symbol = Datum::symbol(symbol, Default::default());
         import_datum(self, &symbol)
     }
