@@ -82,13 +82,18 @@ typedef enum {
    */
   ESL_FULL = 13,
   /**
-   * The engine is gone.
+   * The engine is gone, or replays a run without this question.
    */
   ESL_ENDED = 14,
   /**
    * The program has asked to end; the argument of the failure is the status.
    */
   ESL_PROGRAM_EXITED = 16,
+  /**
+   * The engine replays a recording, and does something else than the recorded engine did. The message says
+   * what.
+   */
+  ESL_DIVERGED = 17,
   /**
    * A fault of ESL itself. The message has what to report.
    */
@@ -457,8 +462,8 @@ typedef void (*esl_observer)(void *user, const esl_seen *seen);
 typedef void (*esl_operation_function)(void *user, esl_operation *operation);
 
 /**
- * A function that is told something about an operation. It is called on the thread of the engine, and only
- * hands on the message. It neither ends the operation nor uses the engine.
+ * A function that is told something about an operation or a reply. It is called on the thread of the engine,
+ * and only hands on the message. It neither ends the operation nor uses the engine.
  */
 typedef void (*esl_notice_function)(void *user);
 
@@ -1154,7 +1159,9 @@ esl_status esl_config_set_recording(const esl_config *config, bool is_recorded);
 /**
  * Has engines replay a recording, which they copy: they call neither functions nor operations of the
  * embedder, ask no clock, and write nothing, but do the same as the recorded engine if they are given the
- * same definitions and texts. `esl_engine_canary` tells whether they did.
+ * same definitions and texts. `esl_engine_canary` tells whether they did; a call returns `ESL_DIVERGED` when
+ * they ask for something else. Such an engine waits for nothing: what came from outside comes again by
+ * itself, so other threads need not send it. A question to it that was not recorded ends with `ESL_ENDED`.
  *
  * The caller sees to it that
  * `config` is settings and `recording` a recording; `failure` is a place that can be written, or null.
@@ -1204,6 +1211,22 @@ esl_status esl_reply_take(const esl_reply *reply, esl_value **value, esl_failure
  * null.
  */
 esl_status esl_reply_wait(const esl_reply *reply, esl_value **value, esl_failure **failure);
+
+/**
+ * Has `function` called once, when the answer has come or the engine is gone; at once if it has come
+ * already. `esl_reply_take` then has the answer. One function at a time: a second one replaces the first. It
+ * is called on the thread of the engine, while no task runs: it uses replies and handles only, and may free
+ * this reply. `user` is freed after the call; with a status other than `ESL_OK` at once.
+ *
+ * The caller sees to it that
+ * `reply` is a reply; `function` and `destructor` can be called with `user` on any thread; `failure` is a
+ * place that can be written, or null.
+ */
+esl_status esl_reply_on_answer(const esl_reply *reply,
+                               esl_notice_function function,
+                               void *user,
+                               esl_destructor destructor,
+                               esl_failure **failure);
 
 /**
  * Frees a reply; null is ignored.

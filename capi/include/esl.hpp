@@ -24,7 +24,32 @@
 
 #include "esl.h"
 
+// ThreadSanitizer does not see the locks inside the library, by which an object goes from one thread to another.
+#if defined(__SANITIZE_THREAD__)
+#define ESL_THREAD_SANITIZER 1
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define ESL_THREAD_SANITIZER 1
+#endif
+#endif
+#ifdef ESL_THREAD_SANITIZER
+extern "C" void __tsan_acquire(void *);
+extern "C" void __tsan_release(void *);
+#endif
+
 namespace esl {
+
+// Notes that an object is handed to another thread, and that it has come.
+inline void note_sending([[maybe_unused]] void *object) {
+#ifdef ESL_THREAD_SANITIZER
+    __tsan_release(object);
+#endif
+}
+inline void note_arrival([[maybe_unused]] void *object) {
+#ifdef ESL_THREAD_SANITIZER
+    __tsan_acquire(object);
+#endif
+}
 
 // An owner of an object of C.
 template <typename T, void (*Free)(T *)>
@@ -495,6 +520,7 @@ public:
         auto state = std::make_unique<waiting>(waiting{std::move(*this), {}});
         std::future<T> result = state->promise.get_future();
         auto call = [](void *user) {
+            note_arrival(user);
             auto *come = static_cast<waiting *>(user);
             try {
                 if constexpr (std::is_void_v<T>) {
@@ -508,6 +534,7 @@ public:
             }
         };
         const esl_reply *asked = state->asked.object.get();
+        note_sending(state.get());
         esl_failure *thrown = nullptr;
         require(esl_reply_on_answer(asked, call, state.release(), destroy<waiting>, &thrown), thrown);
         return result;
