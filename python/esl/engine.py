@@ -44,12 +44,21 @@ class Definition(NamedTuple):
 def size_of(memory: Optional[Size]) -> Optional[int]:
     """Returns a size as a number of bytes."""
     if not isinstance(memory, str):
+        if memory is not None and memory < 0:
+            raise ValueError(f"{memory} is not a size: expected a number of bytes, or a text such as \"64M\"")
         return memory
     units = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
     digits, unit = (memory[:-1], memory[-1].upper()) if memory[-1:].upper() in units else (memory, "")
     if not digits.isdigit():
         raise ValueError(f"`{memory}` is not a size: expected a number, optionally followed by K, M or G")
     return int(digits) * units.get(unit, 1)
+
+
+def rights_of(allow: Iterable[str]) -> list[str]:
+    """Returns rights as a list of texts."""
+    if isinstance(allow, str):
+        raise TypeError(f"rights are a list of texts: allow=[{allow!r}]")
+    return list(allow)
 
 
 class Engine:
@@ -83,7 +92,7 @@ class Engine:
     ) -> None:
         self._machine = _esl.Engine(
             clock=clock,
-            allow=list(allow),
+            allow=rights_of(allow),
             memory=size_of(memory),
             seed=seed,
             budget=budget,
@@ -316,6 +325,8 @@ async def _read_later(future: Any, read: Callable[[Any], Any]) -> Any:
 
 
 def _name(function: Callable[..., Any]) -> str:
+    if function.__name__ == "<lambda>":
+        raise TypeError("a lambda has no name by which a program can call it: define the function by `def`")
     return program_name(function.__name__)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Callable, Iterable, NamedTuple, Optional, Union
 
 from . import _esl
-from .engine import Size, size_of
+from .engine import Size, rights_of, size_of
 from .errors import Diagnostic, diagnostics_of
 
 PathLike = Union[str, "os.PathLike[str]"]
@@ -61,7 +61,7 @@ def run(
     if clock not in ("real", "virtual"):
         raise ValueError(f"`{clock}` is not a clock: expected `real` or `virtual`")
     status, report = _esl.run(
-        path, recording, clock == "virtual", list(allow), size_of(memory), seed, budget, list(arguments), output
+        path, recording, clock == "virtual", rights_of(allow), size_of(memory), seed, budget, list(arguments), output
     )
     return RunResult(status, report)
 

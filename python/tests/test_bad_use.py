@@ -32,6 +32,25 @@ def test_a_value_of_another_engine():
     assert one.call("identity", held) is other.call("identity", held)
 
 
+def test_settings_that_are_none():
+    for settings, error, text in [
+        ({"memory": -5}, ValueError, "-5 is not a size"),
+        ({"memory": "64 MB"}, ValueError, "followed by K, M or G"),
+        ({"allow": "net=127.0.0.1:1"}, TypeError, r"allow=\['net=127.0.0.1:1'\]"),
+        ({"allow": ["network"]}, ValueError, "`network` is not a right"),
+        ({"clock": "fake"}, ValueError, "`fake` is not a clock"),
+    ]:
+        with pytest.raises(error, match=text):
+            esl.Engine(**settings)
+
+
+def test_a_lambda_is_no_function_of_a_program():
+    engine = esl.Engine()
+    for define in [engine.function, engine.operation]:
+        with pytest.raises(TypeError, match="a lambda has no name"):
+            define(lambda x: x)
+
+
 def test_a_call_from_a_second_thread():
     engine = esl.Engine()
     engine.eval("(define-input done)")
