@@ -40,8 +40,8 @@ fn path_with(python: &Path) -> std::ffi::OsString {
 
 /// Makes the packages once; nothing without the tools for it.
 static PACKAGES: LazyLock<Option<Packages>> = LazyLock::new(|| {
-    let tools = ["maturin==1.16.0", "cmake==3.31.6"];
-    let python = venv::python("packaging", &tools, "import maturin, cmake")?;
+    let tools = ["maturin==1.16.0", "cmake==3.31.6", "pytest==8.4.2"];
+    let python = venv::python("packaging", &tools, "import maturin, cmake, pytest")?;
     let built = Path::new(ESLVM).parent().expect("it is in a folder");
     let has_libraries = ["libesl_capi.so", "libesl_python.so"]
         .iter()
@@ -109,8 +109,17 @@ fn a_wheel_has_the_commands_and_the_module() {
     check_commands(packages.python.parent().expect("it is in a folder"), &program);
     let text = "import esl; print(esl.Engine().eval('(loop for n to 3 collect (* n n))'))";
     // From a folder without the sources of the module.
-    let ran = output(python().args(["-c", text]).current_dir(packages.empty("elsewhere")));
+    let elsewhere = packages.empty("elsewhere");
+    let ran = output(python().args(["-c", text]).current_dir(&elsewhere));
     assert_eq!(ran, "[0, 1, 4, 9]\n");
+    // pytest finds the plugin by itself, and once if it is named, too.
+    std::fs::write(elsewhere.join("sum_test.esl"), "(deftest adding (is (= (+ 1 1) 2)))")
+        .expect("it can be written");
+    let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
+    for named in [&[][..], &["-p", "esl.pytest_plugin"]] {
+        let ran = output(python().args(pytest).args(named).current_dir(&elsewhere));
+        assert!(ran.contains("1 passed"), "{ran}");
+    }
 }
 
 #[test]
