@@ -89,7 +89,7 @@ impl Settings {
     }
 }
 
-/// What an engine records or replays.
+/// The recording that an engine keeps or replays.
 pub(crate) enum Memory {
     None,
     Recorded(Recording),

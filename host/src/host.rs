@@ -308,8 +308,8 @@ pub trait Host {
         self.inbox().take()
     }
 
-    /// Returns whether this is a replay, which waits for nothing: all that can come comes by itself, in one of
-    /// the rounds to come.
+    /// Returns whether this is a replay, which waits for nothing: all that can come comes by itself, in one
+    /// of the rounds to come.
     fn replay_state(&self) -> ReplayState {
         ReplayState::Live
     }

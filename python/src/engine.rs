@@ -379,7 +379,7 @@ impl Engine {
         })
     }
 
-    /// What was recorded so far.
+    /// The recording so far.
     fn recording(&self) -> PyResult<Recording> {
         let _guard = self.lock()?;
         self.memory.recording()

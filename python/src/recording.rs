@@ -25,7 +25,7 @@ impl Recording {
     }
 }
 
-/// What an engine records or replays.
+/// The recording that an engine keeps or replays.
 pub(crate) enum Memory {
     None,
     Recorded(esl::host::Recording),

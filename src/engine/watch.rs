@@ -125,9 +125,9 @@ impl Drop for FactWatch {
 
 impl Engine {
     /// Calls `function` for each change of a fact that matches a pattern, in the order of the changes, until
-    /// the watch is dropped, with which `function` is dropped too. It is called on the thread that runs the
-    /// engine, between two turns of the program's tasks, and cannot call back. A panic in it ends the watch. Tasks of the program may have
-    /// some turns until the watch has begun.
+    /// the watch is dropped, and `function` with it. `function` is called on the thread that runs the engine,
+    /// between two turns of the program's tasks, and cannot call back. A panic in it ends the watch. Tasks of
+    /// the program may have some turns until the watch has begun.
     ///
     /// ```
     /// use std::sync::mpsc::channel;

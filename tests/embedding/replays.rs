@@ -84,7 +84,7 @@ fn questions_that_were_not_recorded_end() {
     });
     while !other.is_finished() {
         drive(&mut replay, None);
-        // What the recording does not have rings the bell.
+        // A question without a record rings the bell.
         drop(replay.eval("(+ 1 2)"));
     }
     let (answers, signals) = other.join().expect("it does not panic");

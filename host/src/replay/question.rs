@@ -50,8 +50,9 @@ impl RecordedQuestions {
 }
 
 impl ReplayHost {
-    /// Drops the contents of the inbox, which the recorded ones replace. A signal leaves its room to the next;
-    /// a question that the recording does not have, or that comes after a divergence, ends without an answer.
+    /// Drops the contents of the inbox, which the recorded ones replace. A signal leaves its room to the
+    /// next; a question that the recording does not have, or that comes after a divergence, ends without an
+    /// answer.
     pub(super) fn drop_arrivals(&self) {
         for incoming in self.inbox.take() {
             if let Incoming::Message { input, .. } = &incoming {

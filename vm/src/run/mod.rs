@@ -106,7 +106,7 @@ impl Vm {
         let scheduler = &mut self.scheduler;
         match self.outside.host.replay_state() {
             ReplayState::Live => {}
-            // What ends the pause rings in each round until it comes.
+            // The recorded end of a pause rings in each round until it comes.
             ReplayState::Replays if !scheduler.is_paused || self.outside.inbox.is_rung() => {}
             ReplayState::Replays | ReplayState::IsOver => return false,
         }
