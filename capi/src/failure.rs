@@ -80,9 +80,27 @@ impl Fault {
     }
 }
 
+/// Returns the text of an error, in which limits have the names that they have in C.
+fn message_of(error: &Error) -> String {
+    match error {
+        Error::NoMemory(thing) => {
+            format!("the memory limit leaves no room for {thing}: raise it by `esl_config_set_memory`")
+        }
+        Error::BudgetSpent => {
+            "the engine has spent its budget of ticks: make a new one, or raise the limit by \
+                               `esl_config_set_budget`"
+                .into()
+        }
+        Error::TicksUsed(ticks) => format!(
+            "the evaluation did not end within {ticks} ticks: raise the limit by `esl_config_set_ticks`"
+        ),
+        error => error.to_string(),
+    }
+}
+
 impl From<Error> for Fault {
     fn from(error: Error) -> Fault {
-        let mut fault = Fault::new(esl_status::of_error(&error), error.to_string());
+        let mut fault = Fault::new(esl_status::of_error(&error), message_of(&error));
         if let Error::Exited(status) = error {
             fault.0.arguments = vec![esl_value(Data::Integer(status.into()))];
         }

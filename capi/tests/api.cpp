@@ -282,6 +282,14 @@ int main() {
     divergence();
     threads();
     CHECK(cause_of([] { esl::settings s; s.allow = {"fly"}; esl::engine engine(s); }) == ":INVALID-ARGUMENT");
+    try {
+        esl::settings small;
+        small.memory = 1000;
+        esl::engine engine(small);
+        CHECK(false);
+    } catch (const esl::failure &thrown) {
+        CHECK(std::string(thrown.what()).find("raise it by `esl_config_set_memory`") != std::string::npos);
+    }
     std::cout << faults << " faults" << std::endl;
     return faults != 0;
 }

@@ -5,7 +5,7 @@ use esl::host::{FailureFrame, SendError};
 use esl::{Data, Error};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use pyo3::call::PyCallArgs;
-use pyo3::exceptions::{PyFileNotFoundError, PyRuntimeError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
@@ -23,7 +23,7 @@ pub(crate) fn exception<'py>(py: Python<'py>, class: &str, arguments: impl PyCal
 /// Returns the exception of an error of an engine. An exception that a callback has raised, and nothing in
 /// the program has handled, comes back as itself.
 pub(crate) fn of_error(py: Python<'_>, error: Error) -> PyErr {
-    let message = error.to_string();
+    let message = message_of(&error);
     match error {
         Error::Failed { cause, message, report, arguments, frames } => {
             if cause.trim_start_matches(':') == PYTHON_ERROR
@@ -49,18 +49,30 @@ pub(crate) fn of_error(py: Python<'_>, error: Error) -> PyErr {
     }
 }
 
-/// Returns the exception of the operating system for a file that cannot be read.
-fn unreadable(py: Python<'_>, file: &str, message: String) -> PyErr {
-    match std::fs::File::open(file).map(drop) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            let number = error.raw_os_error().unwrap_or(0);
-            pyo3::exceptions::PyOSError::new_err((number, message, file.to_owned()))
+/// Returns the text of an error, in which limits have the names that they have in Python.
+fn message_of(error: &Error) -> String {
+    match error {
+        Error::NoMemory(thing) => {
+            format!("the memory limit leaves no room for {thing}: raise it by `esl.Engine(memory=…)`")
         }
-        _ => {
-            let errno = py.import("errno").and_then(|errno| errno.getattr("ENOENT")?.extract::<i32>());
-            PyFileNotFoundError::new_err((errno.unwrap_or(2), message, file.to_owned()))
+        Error::BudgetSpent => {
+            "the engine has spent its budget of ticks: make a new one, or raise the limit by \
+                               `esl.Engine(budget=…)`"
+                .into()
         }
+        error => error.to_string(),
     }
+}
+
+/// Returns the exception of a file that cannot be read: that of the system, or `esl.Error` if its contents
+/// are the reason.
+fn unreadable(py: Python<'_>, file: &str, message: String) -> PyErr {
+    let Some(number) = std::fs::read(file).err().and_then(|error| error.raw_os_error()) else {
+        return exception(py, "Error", (message,));
+    };
+    let text = py.import("os").and_then(|os| os.call_method1("strerror", (number,))?.extract::<String>());
+    // Python makes a FileNotFoundError and the like of it, by the number.
+    text.map_or_else(|error| error, |text| PyOSError::new_err((number, text, file.to_owned())))
 }
 
 /// Returns the exception of an error of an engine in the evaluation of a text, whose name is that of its file

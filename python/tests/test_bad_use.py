@@ -44,6 +44,25 @@ def test_settings_that_are_none():
             esl.Engine(**settings)
 
 
+def test_limits_have_their_names():
+    with pytest.raises(esl.NoMemory, match=r"esl.Engine\(memory=…\)"):
+        esl.Engine(memory=100)
+    with pytest.raises(esl.BudgetSpent, match=r"esl.Engine\(budget=…\)"):
+        esl.Engine(budget=100_000).eval("(loop)")
+
+
+def test_a_file_that_cannot_be_read(tmp_path):
+    engine = esl.Engine()
+    with pytest.raises(FileNotFoundError) as raised:
+        engine.load(tmp_path / "nothing.esl")
+    assert str(raised.value) == f"[Errno 2] No such file or directory: '{tmp_path / 'nothing.esl'}'"
+    with pytest.raises(IsADirectoryError):
+        engine.load(tmp_path)
+    (tmp_path / "latin.esl").write_bytes(b'(print "\xe9")')
+    with pytest.raises(esl.Error, match="latin.esl.*utf-8"):
+        esl.run(tmp_path / "latin.esl")
+
+
 def test_a_lambda_is_no_function_of_a_program():
     engine = esl.Engine()
     for define in [engine.function, engine.operation]:
