@@ -1346,6 +1346,12 @@ macro_rules! for_each_builtin {
             /// Makes `instance` one of `class`, with another layout and other slots, and returns it.
             ChangeInstance = instance::change_instance, internal "%CHANGE-INSTANCE"
                 ("instance class layout slots") shares slots;
+            /// A list of the structures that are instances of just this class. A whole collection finds them.
+            InstancesOf = instance::instances_of, internal "%INSTANCES-OF" ("class") shares nothing;
+            /// Gives each structure of the list `olds` the slots of that of the list `news`, and `class` as
+            /// its class. Each stays the object that it is. Returns their number.
+            MoveStructures = instance::move_structures, internal "%MOVE-STRUCTURES" ("olds news class")
+                shares slots;
             /// Whether `object` is an instance of a class that `DEFCLASS` has defined.
             Instancep = instance::instancep, internal "%INSTANCEP" ("object") shares nothing;
             /// The content of a slot without a value.

@@ -130,7 +130,8 @@ fn loosely_same(
         }
         (Some(Kind::Structure), Some(Kind::Structure)) => {
             // Instances of DEFCLASS are the same only if they are one object.
-            if heap.structure_class(a) != heap.structure_class(b) || heap.is_instance(a) {
+            let class = |v| heap.structure_class(heap.structure_whole(v));
+            if class(a) != class(b) || heap.is_instance(a) {
                 return Some(false);
             }
             let (left, right) = (heap.structure_slots(a)?, heap.structure_slots(b)?);
@@ -367,7 +368,8 @@ fn loose_hash(heap: &Heap, v: Value, hash: u64, open: &mut SmallVec<[Value; 16]>
         Some(Kind::Structure) if !heap.is_instance(v) => {
             let slots = heap.structure_slots(v).unwrap_or_default();
             open.extend(slots.iter().take(HASHED_PARTS).rev().copied());
-            mix(hash, heap.identity(heap.structure_class(v).unwrap_or(Value::NIL)))
+            let class = heap.structure_class(heap.structure_whole(v));
+            mix(hash, heap.identity(class.unwrap_or(Value::NIL)))
         }
         Some(Kind::HashTable) => mix(hash, 7),
         _ => mix(hash, heap.identity(v)),

@@ -187,6 +187,32 @@ fn what_the_interpreter_trusts_cannot_be_overwritten() {
 }
 
 #[test]
+fn a_structure_that_has_moved_has_the_slots_of_another_one() {
+    let mut heap = heap();
+    let class = |heap: &mut Heap| heap.alloc_record(Kind::Class, 0, 0, &[n(1)]).unwrap();
+    let (old, new, moved) = (class(&mut heap), class(&mut heap), class(&mut heap));
+    let small = heap.alloc_structure(old, &[n(1)]).unwrap();
+    let whole = heap.alloc_structure(new, &[n(2), n(3)]).unwrap();
+    let empty = heap.alloc_structure(old, &[]).unwrap();
+    let unfit = [(small, small, moved), (empty, whole, moved), (small, whole, n(1)), (n(1), whole, moved)];
+    for (v, to, class) in unfit {
+        assert_eq!(heap.structure_move(v, to, class), None);
+    }
+    assert_eq!(heap.structure_slots(small), Some(&[n(1)][..]));
+    assert_eq!(heap.structure_move(small, whole, moved), Some(()));
+    assert_eq!(heap.structure_set(small, 1, n(4)), Some(()));
+    assert_eq!(heap.structure_slots(small), Some(&[n(2), n(4)][..]));
+    assert_eq!(heap.structure_slots(whole), Some(&[n(2), n(4)][..]));
+    assert_eq!((heap.structure_class(small), heap.structure_whole(small)), (Some(moved), whole));
+    // Its whole may move in turn; nothing moves twice, or to one that has moved.
+    let larger = heap.alloc_structure(new, &[n(5), n(6), n(7)]).unwrap();
+    assert_eq!(heap.structure_move(small, larger, moved), None);
+    assert_eq!(heap.structure_move(whole, larger, moved), Some(()));
+    assert_eq!(heap.structure_move(larger, whole, moved), None);
+    assert_eq!(heap.structure_slots(small), Some(&[n(5), n(6), n(7)][..]));
+}
+
+#[test]
 fn symbols_have_their_cells() {
     let mut heap = heap();
     let s = symbol(&mut heap, "foo");

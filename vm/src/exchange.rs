@@ -80,6 +80,11 @@ pub(crate) struct Exchange {
     pub(crate) collected_at: Option<(SavedPc, u64)>,
     /// The overhead of collections for want of room.
     pub(crate) overhead: CollectionOverhead,
+    /// The class whose instances the next full collection finds.
+    pub(crate) sought: Option<Value>,
+    /// A class and its instances, found by a full collection, until the call that has sought them is made
+    /// again.
+    pub(crate) found: Option<(Value, Vec<Value>)>,
 }
 
 impl Exchange {
@@ -93,6 +98,8 @@ impl Exchange {
             charges: Charges::default(),
             collected_at: None,
             overhead: CollectionOverhead::default(),
+            sought: None,
+            found: None,
         }
     }
 

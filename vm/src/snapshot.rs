@@ -125,8 +125,17 @@ impl Vm {
         if !rests {
             return None;
         }
-        let Exchange { values, raised: _, requested_call: _, lookups, charges: _, collected_at, overhead } =
-            exchange;
+        let Exchange {
+            values,
+            raised: _,
+            requested_call: _,
+            lookups,
+            charges: _,
+            collected_at,
+            overhead,
+            sought: _,
+            found: _,
+        } = exchange;
         let database = database.copy()?;
         let host = host.save_all()?;
         Some(Snapshot {
@@ -193,6 +202,8 @@ impl Vm {
             charges: Charges::default(),
             collected_at: exchange.collected_at,
             overhead: exchange.overhead,
+            sought: None,
+            found: None,
         };
         self.embedder = embedder.clone();
         self.config = config.clone();

@@ -256,6 +256,8 @@ list_state! { Exchange {
     overhead: Run by |overhead: &CollectionOverhead, sink: &mut dyn StateSink| {
         overhead.words().into_iter().for_each(|word| sink.word(word));
     },
+    sought: Derived,
+    found: Derived,
 } }
 list_state! { Embedder {
     pinned: Run,

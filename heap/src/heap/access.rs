@@ -241,7 +241,34 @@ impl Heap {
     /// Returns the slots of a structure, without its class.
     #[inline]
     pub fn structure_slots(&self, v: Value) -> Option<&[Value]> {
-        self.record(v, Kind::Structure).map(|slots| &slots[1..])
+        self.record(self.structure_whole(v), Kind::Structure).map(|slots| &slots[1..])
+    }
+
+    /// Returns the structure that holds the slots of `v`: `v` itself, unless it has moved.
+    #[inline]
+    pub fn structure_whole(&self, v: Value) -> Value {
+        let mut whole = v;
+        // One that has moved does not become the whole of another one, so this ends.
+        while self.flags(whole, Kind::Structure).is_some_and(|flags| flags & StructureObject::MOVED != 0) {
+            whole = self.slot_or_nil(whole, 1);
+        }
+        whole
+    }
+
+    /// Moves the structure `v`: its slots are those of the structure `whole` from now on, and `class` is its
+    /// class. It stays the object that it is. `None` if one of the two is not a structure, is an instance or
+    /// has moved, if `v` has no slot, or if `class` is not a Class.
+    pub fn structure_move(&mut self, v: Value, whole: Value, class: Value) -> Option<()> {
+        let unfit = StructureObject::INSTANCE | StructureObject::MOVED;
+        let (flags, other) = (self.flags(v, Kind::Structure)?, self.flags(whole, Kind::Structure)?);
+        let count = self.record(v, Kind::Structure)?.len();
+        if (flags | other) & unfit != 0 || v == whole || count < 2 || !self.is(class, Kind::Class) {
+            return None;
+        }
+        self.set_slot(v, Kind::Structure, 0, class)?;
+        self.set_slot(v, Kind::Structure, 1, whole)?;
+        (2..count).try_for_each(|index| self.set_slot(v, Kind::Structure, index, Value::NIL))?;
+        self.set_flags(v, Kind::Structure, flags | StructureObject::MOVED)
     }
 
     /// Returns the class of a structure.
@@ -253,6 +280,7 @@ impl Heap {
     /// Sets a slot of a structure, where the class does not count; `None` if `v` has no such slot.
     #[inline]
     pub fn structure_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
+        let v = self.structure_whole(v);
         self.set_slot(v, Kind::Structure, index.checked_add(1)?, new)
     }
 

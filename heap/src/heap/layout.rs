@@ -443,7 +443,7 @@ impl HashTable {
 pub struct StructureObject {
     /// Kind; length 1 + number of slots.
     pub header: Header,
-    /// Class, a Class object. The heap guarantees that, and that it never changes.
+    /// Class, a Class object. The heap guarantees that; it changes for instances and moved structures only.
     pub class: Value,
     /// Slots, `header.len - 1` of them.
     pub slots: [Value; 0],
@@ -454,6 +454,8 @@ impl StructureObject {
     pub const INSTANCE: u8 = 1;
     /// Flag of a structure that `equal` compares by its slots, as a pathname.
     pub const VALUE: u8 = 2;
+    /// Flag of a structure whose slots are in the one that its first slot refers to; no code has its class.
+    pub const MOVED: u8 = 4;
 }
 
 const _: () = assert!(size_of::<StructureObject>() == 16);

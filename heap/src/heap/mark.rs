@@ -415,6 +415,21 @@ impl Heap {
         mark_roots: impl FnOnce(&mut Heap),
         tell: impl FnOnce(&Heap),
     ) {
+        // SAFETY: the contract is the same.
+        unsafe { self.collect_fully_and_find(None, mark_roots, tell) };
+    }
+
+    /// As [`Heap::collect_fully_and_tell`]. Returns the structures that go on living and are instances of
+    /// just this class, if one is given.
+    ///
+    /// # Safety
+    /// The contract of [`Heap::end_marking`], for what `mark_roots` marks.
+    pub unsafe fn collect_fully_and_find(
+        &mut self,
+        class: Option<Value>,
+        mark_roots: impl FnOnce(&mut Heap),
+        tell: impl FnOnce(&Heap),
+    ) -> Vec<Value> {
         match self.phase {
             Phase::Marking => self.abandon_marking(),
             Phase::Sweeping => self.finish_sweep(),
@@ -422,12 +437,39 @@ impl Heap {
         }
         self.start_marking();
         mark_roots(self);
+        let found = class.map_or(Vec::new(), |class| self.follow_and_find(class));
         while let SliceOutcome::More = self.follow(&mut i64::from(u32::MAX)) {}
         tell(self);
         // SAFETY: by the contract, `mark_roots` has marked every value that will be used, and everything
         // reachable from those was followed.
         unsafe { self.end_marking() };
         self.finish_sweep();
+        found
+    }
+
+    /// Follows marked objects until none is left. Returns the instances of just this class among them.
+    fn follow_and_find(&mut self, class: Value) -> Vec<Value> {
+        let (mut found, mut left) = (Vec::new(), i64::MAX);
+        loop {
+            // Every marked object that has values comes to the stack once, and to `pieces` behind that.
+            if let Some(v) = self.marker.stack.pop() {
+                if let Some(Cons { car, cdr }) = self.as_cons(v) {
+                    self.mark(cdr);
+                    self.mark(car);
+                    continue;
+                }
+                if self.structure_class(v) == Some(class) {
+                    found.push(v);
+                }
+                self.visit_record(v, 0, &mut left);
+            } else if let Some((v, from)) = self.marker.pieces.pop() {
+                self.visit_record(v, from, &mut left);
+            } else if self.marker.grays > 0 {
+                self.collect_grays(&mut left);
+            } else {
+                return found;
+            }
+        }
     }
 }
 

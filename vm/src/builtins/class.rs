@@ -98,7 +98,8 @@ pub(super) fn find_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn class_of(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(vm.heap.structure_class(arguments[0]).unwrap_or(Value::NIL))
+    let whole = vm.heap.structure_whole(arguments[0]);
+    Ok(vm.heap.structure_class(whole).unwrap_or(Value::NIL))
 }
 
 pub(super) fn classp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -165,9 +166,8 @@ pub(super) fn make_value_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome 
 }
 
 pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (Some(class), Some(slots)) =
-        (vm.heap.structure_class(arguments[0]), vm.heap.structure_slots(arguments[0]))
-    else {
+    let whole = vm.heap.structure_whole(arguments[0]);
+    let (Some(class), Some(slots)) = (vm.heap.structure_class(whole), vm.heap.structure_slots(whole)) else {
         return instance_error(vm, arguments[0], vm.names.known.structure_object);
     };
     if vm.heap.is_instance(arguments[0]) {

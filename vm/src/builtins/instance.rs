@@ -10,8 +10,9 @@
 //! slot up.
 
 use crate::builtins::class::superclasses;
+use crate::builtins::list::list_items;
 use crate::heap::layout::StructureObject;
-use crate::heap::{Heap, Kind};
+use crate::heap::{AllocError, Heap, Kind};
 use crate::names::class::{self, class_slot, slot};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
@@ -30,8 +31,9 @@ fn parts(heap: &Heap, v: Value) -> Option<(Value, Value)> {
     if !heap.is_instance(v) {
         return None;
     }
-    let slots = heap.structure_slots(v)?;
-    Some((*slots.get(LAYOUT)?, *slots.get(SLOTS)?))
+    // An instance never moves, so its slots are its own.
+    let [_, layout, slots] = *heap.slots(v, Kind::Structure)?;
+    Some((layout, slots))
 }
 
 /// Returns the slots of `instance` and the index in `cache`; `None` if the cache is for another layout, or
@@ -90,6 +92,36 @@ pub(super) fn change_instance(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.heap.structure_set(instance, LAYOUT, layout);
     vm.heap.structure_set(instance, SLOTS, slots);
     Ok(instance)
+}
+
+pub(super) fn instances_of(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [class] = exactly(arguments);
+    if !vm.heap.is(class, Kind::Class) {
+        return vm.exchange.type_error(class, "CLASS");
+    }
+    match vm.exchange.found.take() {
+        Some((of, found)) if of == class => {
+            vm.exchange.charge(found.len());
+            Ok(vm.heap.list(&found)?)
+        }
+        _ => {
+            // A full collection finds them, and the call is made again behind it.
+            vm.exchange.sought = Some(class);
+            Err(AllocError::NeedCollection.into())
+        }
+    }
+}
+
+pub(super) fn move_structures(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [olds, news, class] = exactly(arguments);
+    let (olds, news) = (list_items(vm, olds, usize::MAX)?, list_items(vm, news, usize::MAX)?);
+    vm.exchange.charge(olds.len());
+    for (&old, &new) in olds.iter().zip(&news) {
+        if vm.heap.structure_move(old, new, class).is_none() {
+            return vm.exchange.type_error(old, "STRUCTURE-OBJECT");
+        }
+    }
+    Ok(Value::index(olds.len()))
 }
 
 pub(super) fn update_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -161,6 +161,11 @@ fn mark_roots(
     compiler.roots(&mut |value| heap.mark(value));
     heap.mark_slice(&exchange.values);
     heap.mark_slice(&exchange.requested_call);
+    heap.mark_slice(exchange.sought.as_slice());
+    if let Some((class, found)) = &exchange.found {
+        heap.mark(*class);
+        heap.mark_slice(found);
+    }
     if let Some(raised) = &exchange.raised {
         raised.visit(&mut |value| heap.mark(value));
     }
@@ -303,6 +308,7 @@ impl Vm {
     /// Completes a whole cycle: for want of room, or since each safepoint is to collect.
     pub(crate) fn collect_fully(&mut self) {
         let pause = self.begin_pause();
+        let sought = self.exchange.sought;
         let Vm { heap, names, compiler, scheduler, outside, exchange, embedder, .. } = self;
         #[cfg(feature = "native")]
         let compiled = &mut self.compiled;
@@ -311,7 +317,8 @@ impl Vm {
         // running task, those of the others were noted at the switch.
         unsafe {
             let mut opaques = std::mem::take(&mut names.opaques);
-            heap.collect_fully_and_tell(
+            let found = heap.collect_fully_and_find(
+                sought,
                 |heap| {
                     mark_roots(heap, names, compiler, exchange, embedder, deliveries, outside);
                     for task in tasks.iter_mut() {
@@ -332,6 +339,9 @@ impl Vm {
                 },
             );
             names.opaques = opaques;
+            if let Some(class) = exchange.sought.take() {
+                exchange.found = Some((class, found));
+            }
         }
         self.end_pause(pause);
         self.names.opaques.let_go();
