@@ -38,7 +38,7 @@ use super::pack::{ByteReader, ByteWriter};
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
 /// The version of the format that this library reads and writes.
-pub const FORMAT: u32 = 6;
+pub const FORMAT: u32 = 7;
 
 /// Length of what is before the content of a frame.
 pub(super) const FRAME: usize = 11;
@@ -56,6 +56,7 @@ pub(super) mod kind {
     pub(crate) const LIFE: u8 = 5;
     pub(crate) const MARKED: u8 = 6;
     pub(crate) const MARKED_COMPRESSED: u8 = 7;
+    pub(crate) const UPGRADE: u8 = 8;
 }
 
 /// A function of the embedder's, as a replay has to know it.

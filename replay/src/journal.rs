@@ -1,12 +1,16 @@
 //! The journal of a durable run: a recording that several processes write, one after the other.
 //!
-//! It is a file as `file` describes it, with frames of three further kinds:
+//! It is a file as `file` describes it, with frames of four further kinds:
 //!
 //! ```text
 //! 5 life                 a process begins to write, or pauses the run: mark, and the fields of `JournalLife`
 //! 6 marked records       mark, and the records
 //! 7 the same, compressed by lz4: mark, length of the records, compressed records
+//! 8 upgrade              mark, the program that the run has from here on, and records
 //! ```
+//!
+//! The records of an upgrade have the call that makes the definitions of its program. Both are in one frame,
+//! so a kill leaves both or neither.
 //!
 //! The mark of a frame is the length of the part of the file that was safe when the frame was written:
 //! passed to the kernel, for a run that survives its process, or synced, for one that survives loss of power.
@@ -65,6 +69,17 @@ impl JournalWriter {
     /// Takes the records that wait as a frame with this mark; nothing if none waits.
     pub fn take(&mut self, mark: u64) -> Vec<u8> {
         self.take_as(Some(mark))
+    }
+
+    /// Takes the records that wait as the frame of an upgrade to a program, given as in an `.eslb` file.
+    pub fn take_upgrade(&mut self, mark: u64, program: &[u8]) -> Vec<u8> {
+        let mut out = ByteWriter::default();
+        out.number(mark);
+        out.bytes(program);
+        out.0.append(&mut self.packed.0);
+        let mut bytes = Vec::new();
+        frame(&mut bytes, kind::UPGRADE, &out.0);
+        bytes
     }
 
     /// Takes the records that wait as a frame of a recording that one process writes.
@@ -204,12 +219,23 @@ fn is_torn(bytes: &[u8], offset: usize) -> bool {
 fn has_frame_beyond(bytes: &[u8], offset: usize) -> bool {
     (offset + 1..bytes.len()).any(|at| {
         whole_frame(&bytes[at..]).is_some_and(|(kind, content)| match kind {
-            kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED => {
+            kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED | kind::UPGRADE => {
                 ByteReader(content).number().is_some_and(|mark| mark > offset as u64)
             }
             _ => true,
         })
     })
+}
+
+/// A program that a run was upgraded to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JournalUpgrade {
+    /// Number of records before it.
+    pub records: usize,
+    /// Number of the process that has made it.
+    pub life: u64,
+    /// Bytes of the program, as in an `.eslb` file.
+    pub program: Vec<u8>,
 }
 
 /// The journal of a durable run, as it was found.
@@ -219,6 +245,8 @@ pub struct RunJournal {
     pub recorded: Recorded,
     /// The processes that have written it, and their pauses.
     pub lives: Vec<JournalLife>,
+    /// The programs that the run has been upgraded to.
+    pub upgrades: Vec<JournalUpgrade>,
     /// Bytes of the file that are good: all but a torn tail.
     pub length: usize,
     /// Time of the program's clock at the last record that has one.
@@ -262,12 +290,13 @@ impl RunJournal {
                 FoundFrame::Wrong(problem) => return Err(RecordedError::Damaged { offset, problem }),
             }
         }
-        let JournalReading { beginning, records, lives, end, before, .. } = reading;
+        let JournalReading { beginning, records, lives, upgrades, end, before, .. } = reading;
         let beginning = beginning.ok_or(RecordedError::NoBeginning)?;
         let torn = bytes.len() - offset;
         Ok(RunJournal {
             recorded: Recorded { beginning, records: records.into(), end, torn },
             lives,
+            upgrades,
             length: offset,
             time: before.time(),
             writer: JournalWriter { packed: ByteWriter::default(), before },
@@ -280,6 +309,7 @@ struct JournalReading {
     beginning: Option<Beginning>,
     records: Vec<NotedRecord>,
     lives: Vec<JournalLife>,
+    upgrades: Vec<JournalUpgrade>,
     end: Option<RecordedEnd>,
     before: Before,
     /// Whether this version of the machine has written the file. Another version may write other frames.
@@ -288,8 +318,9 @@ struct JournalReading {
 
 impl Default for JournalReading {
     fn default() -> JournalReading {
-        let (beginning, records, lives, end) = (None, Vec::new(), Vec::new(), None);
-        JournalReading { beginning, records, lives, end, before: Before::default(), is_ours: true }
+        let (beginning, records, lives, upgrades) = (None, Vec::new(), Vec::new(), Vec::new());
+        let before = Before::default();
+        JournalReading { beginning, records, lives, upgrades, end: None, before, is_ours: true }
     }
 }
 
@@ -307,7 +338,7 @@ impl JournalReading {
         let strange = |problem| if is_ours { damaged(problem) } else { RecordedError::OtherMachine };
         let malformed = || strange("the content is not of its kind");
         let mut from = ByteReader(content);
-        if matches!(kind, kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED) {
+        if matches!(kind, kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED | kind::UPGRADE) {
             from.number().filter(|&mark| mark <= offset as u64).ok_or_else(malformed)?;
         }
         match kind {
@@ -319,6 +350,12 @@ impl JournalReading {
                 self.add(ByteReader(&content)).ok_or_else(malformed)?;
             }
             kind::LIFE => self.lives.push(read_life(&mut from).ok_or_else(malformed)?),
+            kind::UPGRADE => {
+                let program = from.bytes().ok_or_else(malformed)?.to_vec();
+                let (records, life) = (self.records.len(), self.lives.last().map_or(0, |life| life.number));
+                self.upgrades.push(JournalUpgrade { records, life, program });
+                self.add(from).ok_or_else(malformed)?;
+            }
             kind::END => self.end = Some(read_end(content).ok_or_else(malformed)?),
             _ => return Err(strange("a frame of an unknown kind")),
         }

@@ -53,10 +53,12 @@ use esl::program::{self, ExecutionIdentity, Program, Summary};
 pub use breakpoint::{Breakpoint, StopError, Target};
 pub use debugger::Debugger;
 pub use file::{Beginning, FORMAT, GivenFunction, MAGIC, Recorded, RecordedEnd, RecordedError};
-pub use journal::{JournalLife, JournalWriter, RunJournal, journal_beginning, journal_end, journal_life};
+pub use journal::{
+    JournalLife, JournalUpgrade, JournalWriter, RunJournal, journal_beginning, journal_end, journal_life,
+};
 pub use pattern::{FactPattern, NotAPattern};
 pub use recorder::FileRecorder;
-pub use rerun::{Replayed, Rerun, RerunError};
+pub use rerun::{Replayed, Rerun, RerunError, begin_recorded};
 
 /// The setup of a run, beside its program and its host.
 #[derive(Clone, Debug, Default)]

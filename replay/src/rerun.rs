@@ -12,7 +12,7 @@ use esl_vm::run::RunOutcome;
 use esl_vm::task::TaskId;
 use esl_vm::vm::Vm;
 
-use super::file::{Recorded, RecordedError, is_own};
+use super::file::{Beginning, Recorded, RecordedError, is_own};
 
 /// Why a recorded run cannot be run again.
 #[derive(Debug)]
@@ -91,7 +91,7 @@ impl Rerun {
         }
         let program = Program::from_bytes(&beginning.program).map_err(RerunError::Program)?;
         let host = ReplayHost::new(recorded.records.clone()).with_screen(screen);
-        let begun = begin(recorded, &program, wrap(host.clone()));
+        let begun = begin_recorded(&recorded.beginning, &program, wrap(host.clone()));
         // A world that has diverged has made the preparations fail.
         let (mut machine, main) = begun.map_err(|error| match host.divergence() {
             Some(_) => RerunError::Recording(RecordedError::Damaged {
@@ -221,15 +221,21 @@ impl Rerun {
     }
 }
 
-/// Makes a machine for a recorded run, and begins the program in it.
-fn begin(recorded: &Recorded, program: &Program, host: Box<dyn Host + Send>) -> Result<(Vm, TaskId), Error> {
-    let beginning = &recorded.beginning;
+/// Makes a machine for a run that has begun so, and begins its program in it. The functions of the embedder
+/// have no effects: the host answers in their place.
+///
+/// # Errors
+/// [`Error`].
+pub fn begin_recorded(
+    beginning: &Beginning,
+    program: &Program,
+    host: Box<dyn Host + Send>,
+) -> Result<(Vm, TaskId), Error> {
     let mut machine = program::machine(beginning.config.clone(), host)?;
     if beginning.has_operators {
         program::load_operators(&mut machine)?;
     }
     for given in &beginning.functions {
-        // They are never called: the host answers in their place.
         let function = if given.is_operation {
             HostFunction::Operation(Box::new(drop))
         } else {
