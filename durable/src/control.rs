@@ -3,8 +3,10 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use esl_host::{Inbox, ReplayHost};
+use esl_host::{Inbox, Pending, ReplayHost};
 use esl_replay::JournalLife;
+
+use super::upgrade::{UpgradeOutcome, UpgradeReport, outcome_of, poll_call};
 
 /// A run that goes on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +21,9 @@ pub struct Resumed {
     pub lost: usize,
 }
 
+/// Is called when a run is upgraded.
+type UpgradeListener = Box<dyn FnOnce(&UpgradeReport) + Send>;
+
 /// Is called when a run goes on.
 type ResumeListener = Box<dyn FnOnce(&Resumed) + Send>;
 
@@ -31,6 +36,10 @@ struct ControlNotes {
     listener: Option<ResumeListener>,
     /// The program's clock at the pause.
     paused_at: Option<u64>,
+    /// The call by which an upgrade is made.
+    upgrading: Option<Pending>,
+    upgraded: Option<UpgradeOutcome>,
+    upgrade_listener: Option<UpgradeListener>,
 }
 
 #[derive(Default)]
@@ -39,6 +48,8 @@ struct ControlState {
     pauses: AtomicBool,
     /// Whether it is over, so that it cannot be paused.
     is_ending: AtomicBool,
+    /// Whether the run is a copy, which comes back at the end of its journal, or when an upgrade was tried.
+    is_copy: AtomicBool,
     told: Mutex<ControlNotes>,
 }
 
@@ -74,6 +85,15 @@ impl DurableControl {
     /// Returns whether the run was asked to pause.
     pub fn is_pausing(&self) -> bool {
         self.0.pauses.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn set_copy(&self) {
+        self.0.is_copy.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns whether the run is a copy.
+    pub(crate) fn is_copy(&self) -> bool {
+        self.0.is_copy.load(Ordering::Relaxed)
     }
 
     /// Returns whether the machine is to come back now.
@@ -125,6 +145,37 @@ impl DurableControl {
 
     pub(crate) fn paused_at(&self) -> Option<u64> {
         self.told().paused_at
+    }
+
+    /// Sets a function that is called when the run has been upgraded. The machine waits for it.
+    pub fn on_upgrade(&self, listener: impl FnOnce(&UpgradeReport) + Send + 'static) {
+        self.told().upgrade_listener = Some(Box::new(listener));
+    }
+
+    /// Notes the call by which an upgrade is made.
+    pub(crate) fn begin_upgrade(&self, call: Pending) {
+        self.told().upgrading = Some(call);
+    }
+
+    /// Looks whether the upgrade is over. The machine is rung when it is. Returns its outcome once.
+    pub(crate) fn hear_upgrade(&self, inbox: &Inbox) -> Option<UpgradeOutcome> {
+        let (outcome, listener) = {
+            let mut told = self.told();
+            let answer = poll_call(told.upgrading.as_mut()?, inbox)?;
+            told.upgrading = None;
+            let outcome = outcome_of(answer);
+            told.upgraded = Some(outcome.clone());
+            (outcome, told.upgrade_listener.take())
+        };
+        if let (Ok(report), Some(listener)) = (&outcome, listener) {
+            listener(report);
+        }
+        Some(outcome)
+    }
+
+    /// Returns the outcome of the upgrade, once it is over.
+    pub(crate) fn upgraded(&self) -> Option<UpgradeOutcome> {
+        self.told().upgraded.clone()
     }
 
     /// Returns the restart, once the run has gone on.

@@ -7,6 +7,8 @@ use std::path::PathBuf;
 use esl_bytecode::file::WriteError;
 use esl_replay::RecordedError;
 
+use super::changes::ProgramChanges;
+
 /// Reason why a durable run cannot begin, or cannot go on.
 #[derive(Debug)]
 #[non_exhaustive]
@@ -23,8 +25,10 @@ pub enum DurableError {
     Journal(RecordedError),
     /// The program contains an object that no file can hold.
     Program(WriteError),
-    /// The folder has the run of another program: the changes, in words.
-    OtherProgram(String),
+    /// The folder has the run of another program: the changes.
+    OtherProgram(Box<ProgramChanges>),
+    /// The run cannot be upgraded to the program: the reason, in words.
+    NotUpgraded(String),
     /// It was begun with other settings: their names.
     OtherSettings(&'static str),
     /// The run does not take the course of its journal.
@@ -64,9 +68,12 @@ impl fmt::Display for DurableError {
             DurableError::Program(error) => write!(f, "the program cannot be durable: {error}"),
             DurableError::OtherProgram(changes) => write!(
                 f,
-                "the folder has the run of another program: {changes}; go on with the earlier program, or begin \
-                 a new run in another folder"
+                "the folder has the run of another program: {changes}; go on with the earlier program, type \
+                 `--upgrade` to make these definitions in the run, or begin a new run in another folder"
             ),
+            DurableError::NotUpgraded(reason) => {
+                write!(f, "the run cannot be upgraded to this program: {reason}; nothing has changed")
+            }
             DurableError::OtherSettings(which) => {
                 write!(f, "the run was begun with {which}; repeat the command by which it was begun")
             }

@@ -12,17 +12,21 @@ use std::collections::{BTreeMap, HashSet};
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
-use esl_bytecode::symbol::Symbol;
 use esl_host::{
     ActionId, Awaited, CallEffect, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, Inbox,
-    Incoming, Input, Intent, News, NotedRecord, Output, Permit, ProcessSignal, QuestionHash, Record,
-    Recorder, RecordingHost, ReplayHost, Right, Rights, RunCheck, Wake, WriteMode, has_gone_object,
+    Incoming, Input, Intent, News, NotedRecord, Output, Permit, ProcessSignal, QuestionHash, Recorder,
+    RecordingHost, ReplayHost, Right, Rights, RunCheck, Wake, WriteMode, has_gone_object,
 };
 
 use super::control::{DurableControl, Resumed};
+use super::error::DurableError;
 use super::file_effect::{FileSize, complete_deletion, complete_request, complete_write, size_of};
+use super::interruption::{
+    after_restart, ended_operations, interrupted, last_question, refused, refused_call, senders,
+};
 use super::log::JournalLog;
 use super::resume::Resumption;
+use super::upgrade::{Upgrade, UpgradeFailure};
 
 /// The host of a durable run.
 pub struct DurableHost<H> {
@@ -43,54 +47,12 @@ pub struct DurableHost<H> {
     interrupts: bool,
     /// Number of senders that are gone.
     lost: usize,
-}
-
-/// Returns the failure of a call that the end of its process has interrupted.
-fn interrupted(call: HostCall<'_>, action: Option<ActionId>) -> HostFailure {
-    let name = Datum::symbol(Symbol::keyword(call.name), Span::default());
-    let arguments = Datum::list(call.arguments.iter().cloned(), Span::default());
-    let action = match action {
-        Some(action) => Datum::string(&action.to_string(), Span::default()),
-        None => Datum::nil(Span::default()),
-    };
-    HostFailure { cause: "INTERRUPTED-BY-RESTART".into(), arguments: vec![name, arguments, action] }
-}
-
-/// Returns the error of an effect that does not leave, since the journal cannot be written.
-fn refused() -> HostError {
-    HostError::Other("the journal cannot be written".into())
-}
-
-/// Returns the failure of such a call.
-fn refused_call() -> HostFailure {
-    HostFailure { cause: "JOURNAL-NOT-WRITTEN".into(), arguments: Vec::new() }
-}
-
-/// Returns the numbers of the operations that have ended by these records.
-fn ended_operations(records: &[NotedRecord]) -> HashSet<u64> {
-    let arrivals = records.iter().flat_map(|noted| match &noted.record {
-        Record::Received((_, contents)) => contents.as_slice(),
-        _ => &[],
-    });
-    let ended = arrivals.filter_map(|incoming| match incoming {
-        Incoming::Operation { news: News::Progress(_), .. } => None,
-        Incoming::Operation { number, .. } => Some(*number),
-        _ => None,
-    });
-    ended.collect()
-}
-
-/// Returns how many senders of the inbox there are after these records.
-fn senders(records: &[NotedRecord]) -> usize {
-    let arrivals = records.iter().filter_map(|noted| match &noted.record {
-        Record::Received((_, contents)) => Some(contents),
-        _ => None,
-    });
-    arrivals.flatten().fold(0, |count: usize, incoming| match incoming {
-        Incoming::SenderCame => count + 1,
-        Incoming::SenderLeft => count.saturating_sub(1),
-        _ => count,
-    })
+    /// Greatest number of a question in the records.
+    asked: u64,
+    /// The upgrade that is to be made when the run goes on.
+    upgrade: Option<Upgrade>,
+    /// The upgrade whose call is among the news for the machine, or under way.
+    upgrading: Option<Upgrade>,
 }
 
 impl<H: Host> DurableHost<H> {
@@ -101,11 +63,13 @@ impl<H: Host> DurableHost<H> {
         control: DurableControl,
         records: std::sync::Arc<[NotedRecord]>,
         resumption: Option<Resumption>,
+        upgrade: Option<Upgrade>,
     ) -> DurableHost<H> {
         let inbox = host.inbox();
         control.set_inbox(inbox.clone());
         let ended = ended_operations(&records);
         let lost = senders(&records);
+        let asked = last_question(&records);
         let early = (0..lost).map(|_| Incoming::SenderLeft).collect();
         let past = ReplayHost::new(records).with_screen(|_, _| ()).with_inbox(inbox.clone());
         control.set_past(past.clone());
@@ -122,6 +86,9 @@ impl<H: Host> DurableHost<H> {
             open: BTreeMap::new(),
             interrupts: false,
             lost,
+            asked,
+            upgrade,
+            upgrading: None,
         }
     }
 
@@ -139,13 +106,15 @@ impl<H: Host> DurableHost<H> {
         self.live.go_on(self.past.not_due());
         let (life, downtime) = resumption.begin(self.live.host_mut().monotonic());
         self.log.note_life(life);
-        let mut first = vec![Incoming::Message {
+        // The upgrade is made before the program is told of its restart.
+        let mut first = self.upgrade.take().map_or(Vec::new(), |upgrade| self.begin_upgrade(upgrade));
+        first.push(Incoming::Message {
             input: "*RESUMED*".into(),
             arguments: vec![
                 Datum::new(DatumKind::Float(downtime), Span::default()),
                 Datum::integer(i64::try_from(life.number).unwrap_or(i64::MAX), Span::default()),
             ],
-        }];
+        });
         let mut interrupted = usize::from(self.interrupts);
         for (number, news) in std::mem::take(&mut self.open) {
             if let Some(news) = news {
@@ -158,6 +127,28 @@ impl<H: Host> DurableHost<H> {
         self.early = first;
         self.inbox.ring();
         true
+    }
+
+    /// Asks the machine for an upgrade. Returns the arrivals by which it is asked.
+    fn begin_upgrade(&mut self, upgrade: Upgrade) -> Vec<Incoming> {
+        let (call, asked) = upgrade.ask(&self.inbox, self.asked);
+        self.control.begin_upgrade(call);
+        // There is no answer yet: the inbox is rung when it comes.
+        let outcome = self.control.hear_upgrade(&self.inbox);
+        debug_assert!(outcome.is_none(), "the machine has not been asked yet");
+        self.upgrading = Some(upgrade);
+        asked
+    }
+
+    /// Deals with the end of an upgrade. Returns whether the machine is to come back.
+    fn end_upgrade(&mut self) -> bool {
+        let Some(outcome) = self.control.hear_upgrade(&self.inbox) else { return false };
+        let upgrade = self.upgrading.take();
+        if let (Err(UpgradeFailure(reason)), Some(upgrade)) = (&outcome, upgrade) {
+            self.log.return_to(upgrade.before);
+            self.log.fail(DurableError::NotUpgraded(reason.clone()));
+        }
+        self.control.is_copy() || outcome.is_err()
     }
 
     /// As [`DurableHost::enter`], where the last record is the intent of a call that is not made again.
@@ -236,14 +227,6 @@ impl<H: Host> DurableHost<H> {
         let answer = change(&mut self.live);
         self.log.write();
         answer
-    }
-}
-
-/// Returns the news of a call that was interrupted, or that has an object of an earlier process.
-fn after_restart(call: HostCall<'_>, action: Option<ActionId>) -> News {
-    match call.effect {
-        CallEffect::Closes => News::Completed(vec![Datum::nil(Span::default())]),
-        _ => News::Failed(interrupted(call, action)),
     }
 }
 
@@ -455,12 +438,23 @@ impl<H: Host> Host for DurableHost<H> {
             // The signal cuts the end of the run short, if that is where it is.
             return vec![Incoming::Signal(ProcessSignal::Interrupt), Incoming::Stop];
         }
+        if self.control.is_copy() && self.is_live() && self.upgrade.is_none() && self.upgrading.is_none() {
+            // The program is not told of a restart.
+            return vec![Incoming::Stop];
+        }
+        let comes_back = self.end_upgrade();
+        if self.log.has_failed() {
+            return vec![Incoming::Signal(ProcessSignal::Interrupt), Incoming::Stop];
+        }
         let pauses = self.control.takes_pause();
         if pauses {
             self.control.note_time(self.live.host_mut().monotonic());
         }
         let mut contents = if self.enter() {
             if !self.early.is_empty() {
+                if let Some(upgrade) = &self.upgrading {
+                    self.log.begin_upgrade(upgrade.program.clone());
+                }
                 let come = self.inbox.take();
                 std::mem::take(&mut self.early).into_iter().chain(come).for_each(|one| self.inbox.put(one));
             }
@@ -476,7 +470,7 @@ impl<H: Host> Host for DurableHost<H> {
             self.ring_at_end();
             contents
         };
-        if pauses {
+        if pauses || comes_back {
             contents.push(Incoming::Stop);
         }
         contents

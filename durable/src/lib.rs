@@ -30,35 +30,42 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod changes;
 mod control;
-mod difference;
 mod disk;
 mod error;
 mod file_effect;
 mod folder;
 mod host;
+mod interruption;
 mod log;
 mod look;
 mod resume;
+mod upgrade;
 
 use std::path::Path;
 
 use esl::program::Program;
 use esl_bytecode::module::Module;
 use esl_host::Host;
-use esl_replay::{Beginning, JournalLife, JournalWriter, RecordedError, RunJournal, RunSetup};
+use esl_replay::{
+    Beginning, JournalLife, JournalUpgrade, JournalWriter, RecordedError, RunJournal, RunSetup,
+};
 use esl_vm::vm::Vm;
 
+pub use changes::ProgramChanges;
 pub use control::{DurableControl, Resumed};
 pub use disk::{Disk, RealDisk};
 pub use error::DurableError;
 pub use host::DurableHost;
 pub use log::LogFigures;
 pub use look::{DurableState, look};
+pub use upgrade::UpgradeReport;
 
 use folder::RunFolder;
 use log::JournalLog;
 use resume::{Resumption, chance, wall_clock};
+use upgrade::Upgrade;
 
 /// The events that a durable run survives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,7 +107,19 @@ pub struct DurableRun {
 /// A run that is to go on.
 struct FoundRun {
     recorded: esl_replay::Recorded,
+    upgrades: Vec<JournalUpgrade>,
     resumption: Resumption,
+    /// Good bytes of the file, if a torn tail follows them.
+    torn: Option<u64>,
+    /// The upgrade that is to be made when it goes on.
+    upgrade: Option<Upgrade>,
+}
+
+impl FoundRun {
+    /// Returns the bytes of the program that the run has now.
+    fn current(&self) -> &[u8] {
+        self.upgrades.last().map_or(&self.recorded.beginning.program, |upgrade| &upgrade.program)
+    }
 }
 
 impl DurableRun {
@@ -120,6 +139,18 @@ impl DurableRun {
         Ok(run)
     }
 
+    /// Takes the folder of a run that is there, to inspect it.
+    ///
+    /// # Errors
+    /// [`DurableError`].
+    pub fn open_to_look(path: &Path) -> Result<DurableRun, DurableError> {
+        if !path.is_dir() {
+            return Err(DurableError::NoRun(path.into()));
+        }
+        let run = DurableRun::open(path, DurableOptions::default())?;
+        if run.found.is_some() { Ok(run) } else { Err(DurableError::NoRun(path.into())) }
+    }
+
     /// Reads the journal on a disk.
     ///
     /// # Errors
@@ -134,20 +165,16 @@ impl DurableRun {
             }
             Some(journal) => journal.map_err(DurableError::Journal)?,
         };
-        let RunJournal { recorded, lives, length, time, writer } = journal;
+        let RunJournal { recorded, lives, upgrades, length, time, writer } = journal;
         if !recorded.beginning.is_of_this_machine() {
             return Err(DurableError::Journal(RecordedError::OtherMachine));
         }
-        if recorded.torn > 0 {
-            disk.truncate(length as u64).map_err(DurableError::NotWritten)?;
-        } else if options.durability == Durability::Power {
-            // Another process may have left it to the system.
-            disk.sync().map_err(DurableError::NotWritten)?;
-        }
+        let torn = (recorded.torn > 0).then_some(length as u64);
         let last = lives.last().copied().unwrap_or_default();
         let resumption = Resumption::new(&last, time, wall_clock(), options.downtime);
         let log = JournalLog::new(disk, writer, length as u64, options.durability);
-        Ok(DurableRun { folder: None, log, control, found: Some(FoundRun { recorded, resumption }) })
+        let found = FoundRun { recorded, upgrades, resumption, torn, upgrade: None };
+        Ok(DurableRun { folder: None, log, control, found: Some(found) })
     }
 
     /// Returns the status with which the run has ended, if it has.
@@ -182,22 +209,30 @@ impl DurableRun {
     /// Returns the host of the run, whose outside is `host`.
     pub fn host<H: Host>(&self, host: H) -> DurableHost<H> {
         self.log.set_inbox(host.inbox());
-        let (records, resumption) = match &self.found {
-            Some(found) => (found.recorded.records.clone(), Some(found.resumption)),
-            None => (Vec::new().into(), None),
+        let (records, resumption, upgrade) = match &self.found {
+            Some(found) => (found.recorded.records.clone(), Some(found.resumption), found.upgrade.clone()),
+            None => (Vec::new().into(), None, None),
         };
-        DurableHost::new(host, self.log.clone(), self.control.clone(), records, resumption)
+        DurableHost::new(host, self.log.clone(), self.control.clone(), records, resumption, upgrade)
     }
 
-    /// Writes the program and the settings of a new run, or compares them with those of the run that goes on.
-    /// The machine has to be ready for its program.
+    /// Writes the program and the settings of a new run, or compares them with those with which the run has
+    /// begun that goes on; [`DurableRun::choose_program`] returns that program. The machine has to be ready
+    /// for it.
     ///
     /// # Errors
     /// [`DurableError`].
     pub fn begin(&self, program: &Program, setup: &RunSetup, machine: &Vm) -> Result<(), DurableError> {
         let beginning = esl_replay::beginning(program, setup, machine).map_err(DurableError::Program)?;
         match &self.found {
-            Some(found) => compare(&found.recorded.beginning, &beginning, program),
+            Some(found) => {
+                compare(&found.recorded.beginning, &beginning, program)?;
+                match found.torn {
+                    Some(length) => self.log.truncate(length),
+                    None => self.log.sync_found(),
+                }
+                self.check()
+            }
             None => {
                 let life =
                     JournalLife { number: 1, is_pause: false, wall: wall_clock(), time: 0, chance: chance() };
@@ -251,16 +286,20 @@ impl DurableRun {
     }
 }
 
+/// Returns whether two programs are one. The name of its file as it is typed may be another one.
+fn is_same_program(before: &Program, given: &Program) -> bool {
+    let renamed = Module { sources: before.module().sources.clone(), ..given.module().clone() };
+    renamed == *before.module()
+}
+
 /// Refuses to go on with a run that has begun with another program or other settings.
 fn compare(found: &Beginning, given: &Beginning, program: &Program) -> Result<(), DurableError> {
     if found.program != given.program {
-        let before = Program::from_bytes(&found.program).map_err(|error| {
-            DurableError::OtherProgram(format!("the program of the run cannot be read: {error}"))
-        })?;
-        // The name of the file as it is typed may be another one.
-        let renamed = Module { sources: before.module().sources.clone(), ..program.module().clone() };
-        if renamed != *before.module() {
-            return Err(DurableError::OtherProgram(difference::difference(&before, program)));
+        let before = Program::from_bytes(&found.program)
+            .map_err(|_| DurableError::Journal(RecordedError::OtherMachine))?;
+        if !is_same_program(&before, program) {
+            let changes = changes::changes(&before, program, &Default::default());
+            return Err(DurableError::OtherProgram(Box::new(changes)));
         }
     }
     let settings = [

@@ -31,6 +31,9 @@ struct LogWriting {
     is_dear: bool,
     /// The process that writes; `None` before it has begun to.
     life: Option<JournalLife>,
+    /// The program of an upgrade, bytes of an `.eslb` file, whose call is among the records that wait or come
+    /// next.
+    upgrade: Option<Vec<u8>>,
     /// Number of effects of this process.
     effects: u64,
     error: Option<DurableError>,
@@ -72,6 +75,7 @@ impl JournalLog {
             synced: length,
             is_dear: false,
             life: None,
+            upgrade: None,
             effects: 0,
             error: None,
             inbox: None,
@@ -108,6 +112,41 @@ impl JournalLog {
         let mark = writing.mark();
         writing.append(&journal_life(&life, mark));
         writing.life = Some(life);
+    }
+
+    /// Cuts off the torn tail of the file, behind `length` good bytes.
+    pub(crate) fn truncate(&self, length: u64) {
+        let mut writing = self.lock();
+        let truncated = writing.disk.truncate(length);
+        writing.hear(truncated);
+    }
+
+    /// Syncs the file if the run survives loss of power: another process may have left parts to the system.
+    pub(crate) fn sync_found(&self) {
+        let mut writing = self.lock();
+        if writing.durability == Durability::Power {
+            let synced = writing.disk.sync();
+            writing.hear(synced);
+        }
+    }
+
+    /// Notes that the records from here on are those of another program, given as in an `.eslb` file. The
+    /// next ones are written in one frame with it.
+    pub(crate) fn begin_upgrade(&self, program: Vec<u8>) {
+        let mut writing = self.lock();
+        writing.write();
+        writing.upgrade = Some(program);
+    }
+
+    /// Notes that the run has this program after all, since an upgrade has failed.
+    pub(crate) fn return_to(&self, program: Vec<u8>) {
+        self.begin_upgrade(program);
+        self.write();
+    }
+
+    /// Stops the run with this error.
+    pub(crate) fn fail(&self, error: DurableError) {
+        self.lock().fail(error);
     }
 
     /// Returns the process that writes, once it has begun to.
@@ -220,7 +259,11 @@ impl LogWriting {
         if self.life.is_none() {
             return;
         }
-        if !self.writer.is_empty() {
+        if let Some(program) = self.upgrade.take() {
+            let mark = self.mark();
+            let bytes = self.writer.take_upgrade(mark, &program);
+            self.append(&bytes);
+        } else if !self.writer.is_empty() {
             let mark = self.mark();
             let bytes = self.writer.take(mark);
             self.append(&bytes);

@@ -5,11 +5,13 @@ use std::path::Path;
 use std::time::SystemTime;
 
 use esl_host::{Record, Survey, SurveyRequest};
-use esl_replay::{JournalLife, Replayed, Rerun, RunJournal};
+use esl_replay::{JournalLife, Recorded, Replayed, Rerun, RunJournal};
+use esl_vm::vm::Vm;
 
-use super::DurableError;
 use super::disk::{Disk, RealDisk};
 use super::folder::RunFolder;
+use super::resume::{Resumption, wall_clock};
+use super::{Downtime, DurableError, DurableRun};
 
 /// A durable run, at the end of its journal.
 pub struct DurableState {
@@ -19,6 +21,8 @@ pub struct DurableState {
     pub identity: String,
     /// The processes that it has had, and its pauses.
     pub lives: Vec<JournalLife>,
+    /// Numbers of the processes that have upgraded it.
+    pub upgrades: Vec<u64>,
     /// Records of the journal.
     pub records: usize,
     /// Effects of which the journal has the intents.
@@ -33,7 +37,7 @@ pub struct DurableState {
     pub written: Option<SystemTime>,
     /// Ticks of all tasks.
     pub ticks: u64,
-    rerun: Rerun,
+    machine: LookedMachine,
     /// The folder is locked while it is inspected.
     _folder: RunFolder,
 }
@@ -41,7 +45,36 @@ pub struct DurableState {
 impl DurableState {
     /// Returns tasks, relations and facts where the journal ends.
     pub fn survey(&mut self, request: &SurveyRequest) -> Survey {
-        self.rerun.machine_mut().survey(request)
+        self.machine.get().survey(request)
+    }
+}
+
+/// The machine of a run at the end of its journal.
+enum LookedMachine {
+    /// The run has ended.
+    Ended(Box<Rerun>),
+    /// It may go on.
+    Open(Box<Vm>),
+}
+
+impl LookedMachine {
+    fn get(&mut self) -> &mut Vm {
+        match self {
+            LookedMachine::Ended(rerun) => rerun.machine_mut(),
+            LookedMachine::Open(machine) => machine,
+        }
+    }
+}
+
+/// Runs a run again that has ended.
+fn run_ended(recorded: &Recorded) -> Result<Rerun, DurableError> {
+    let mut rerun = Rerun::begin(recorded, |_, _| ()).map_err(|error| match error {
+        esl_replay::RerunError::Recording(error) => DurableError::Journal(error),
+        other => DurableError::Diverged(other.to_string()),
+    })?;
+    match rerun.run_to_last_record() {
+        Replayed::Diverged(text) => Err(DurableError::Diverged(text)),
+        _ => Ok(rerun),
     }
 }
 
@@ -58,15 +91,17 @@ pub fn look(path: &Path) -> Result<DurableState, DurableError> {
     let bytes = RealDisk::new(file.clone()).read();
     let bytes = bytes.map_err(|error| DurableError::Folder(file.clone(), error))?;
     let bytes = bytes.ok_or_else(|| DurableError::NoRun(path.into()))?;
-    let RunJournal { recorded, lives, length, .. } =
+    let RunJournal { recorded, lives, upgrades, length, time, .. } =
         RunJournal::read(&bytes).map_err(DurableError::Journal)?;
-    let mut rerun = Rerun::begin(&recorded, |_, _| ()).map_err(|error| match error {
-        esl_replay::RerunError::Recording(error) => DurableError::Journal(error),
-        other => DurableError::Diverged(other.to_string()),
-    })?;
-    if let Replayed::Diverged(text) = rerun.run_to_last_record() {
-        return Err(DurableError::Diverged(text));
-    }
+    let mut machine = match recorded.end {
+        Some(_) => LookedMachine::Ended(Box::new(run_ended(&recorded)?)),
+        None => {
+            let last = lives.last().copied().unwrap_or_default();
+            let resumption = Resumption::new(&last, time, wall_clock(), Downtime::Stops);
+            let copy = DurableRun::copy_of(&recorded, resumption, None);
+            LookedMachine::Open(Box::new(copy.run_to_end_of_journal()?))
+        }
+    };
     let is_intent = |record: &Record| matches!(record, Record::Intended(_));
     let written = fs::metadata(&file).and_then(|metadata| metadata.modified()).ok();
     Ok(DurableState {
@@ -75,12 +110,13 @@ pub fn look(path: &Path) -> Result<DurableState, DurableError> {
         records: recorded.records.len(),
         effects: recorded.records.iter().filter(|noted| is_intent(&noted.record)).count(),
         lives,
+        upgrades: upgrades.iter().map(|upgrade| upgrade.life).collect(),
         bytes: length,
         torn: recorded.torn,
         ended: recorded.end.map(|end| end.status),
         written,
-        ticks: rerun.check().ticks,
-        rerun,
+        ticks: machine.get().check().ticks,
+        machine,
         _folder: folder,
     })
 }

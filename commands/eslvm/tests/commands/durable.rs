@@ -23,43 +23,43 @@ const AGENT: &str = "(define-input *resumed*)
 (say \"over ~d\" *count*)
 (exit 7)";
 
-struct Agent {
-    folder: Folder,
+pub(crate) struct Agent {
+    pub(crate) folder: Folder,
 }
 
-struct Running {
+pub(crate) struct Running {
     child: Child,
     output: BufReader<ChildStdout>,
 }
 
 impl Agent {
-    fn new(name: &str, text: &str) -> Agent {
+    pub(crate) fn new(name: &str, text: &str) -> Agent {
         let folder = Folder::new(name);
         folder.file("agent.esl", text);
         Agent { folder }
     }
 
-    fn command(&self, options: &[&str]) -> Command {
+    pub(crate) fn command(&self, options: &[&str]) -> Command {
         let mut command = eslvm(&["run", "--state", &self.folder.join("state")]);
         command.args(options).arg(self.folder.join("agent.esl"));
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
 
-    fn start(&self, options: &[&str]) -> Running {
+    pub(crate) fn start(&self, options: &[&str]) -> Running {
         let mut child = self.command(options).spawn().expect("the command is there");
         let output = BufReader::new(child.stdout.take().expect("the output is a pipe"));
         Running { child, output }
     }
 
     /// Runs the command to its end: its status, its output and its errors.
-    fn run(&self, options: &[&str]) -> (Option<i32>, String, String) {
+    pub(crate) fn run(&self, options: &[&str]) -> (Option<i32>, String, String) {
         let done = self.command(options).output().expect("the command is there");
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         (done.status.code(), text(&done.stdout), text(&done.stderr))
     }
 
-    fn state(&self, options: &[&str]) -> (Option<i32>, String, String) {
+    pub(crate) fn state(&self, options: &[&str]) -> (Option<i32>, String, String) {
         let mut command = eslvm(&["state"]);
         let done =
             command.args(options).arg(self.folder.join("state")).output().expect("the command is there");
@@ -70,7 +70,7 @@ impl Agent {
 
 impl Running {
     /// Waits for a line of output that is this.
-    fn wait_for(&mut self, expected: &str) {
+    pub(crate) fn wait_for(&mut self, expected: &str) {
         let mut line = String::new();
         while line.trim() != expected {
             line.clear();
@@ -78,12 +78,12 @@ impl Running {
         }
     }
 
-    fn send(&self, signal: &str) {
+    pub(crate) fn send(&self, signal: &str) {
         let sent = Command::new("kill").args([signal, &self.child.id().to_string()]).status();
         assert!(sent.expect("there is a kill").success());
     }
 
-    fn end(mut self) -> (Option<i32>, String) {
+    pub(crate) fn end(mut self) -> (Option<i32>, String) {
         // A run whose output is closed ends by that.
         let mut rest = String::new();
         self.output.read_to_string(&mut rest).expect("output is text");
@@ -126,9 +126,19 @@ fn sigterm_pauses_or_ends_a_run() {
     assert_eq!((status, &*errors), (Some(0), "eslvm: paused; the same command goes on\n"));
     let (status, output, _) = agent.state(&[]);
     assert_eq!(status, Some(0));
-    for line in ["run: paused", "facts: 2 in 1 relations", "tasks: 2", "verified: "] {
+    for line in ["run: paused", "facts: 2 in 1 relations", "tasks: 2", "verified: ", "written: 2"] {
         assert!(output.contains(line), "{line}: {output}");
     }
+    let (_, tasks, _) = agent.state(&["--tasks"]);
+    assert!(
+        tasks.contains("the main task waits for a time")
+            && tasks.contains("WATCHER waits for input *RESUMED*"),
+        "{tasks}"
+    );
+    let (_, log, _) = agent.state(&["--log"]);
+    let events: Vec<&str> =
+        log.lines().filter_map(|line| line.split_once("Z  ")).map(|(_, event)| event).collect();
+    assert_eq!(events, ["begun by process 1", "paused in process 1"]);
     assert_eq!(agent.state(&["--facts", "counted"]).1, "(COUNTED 1)\n(COUNTED 2)\n");
     assert_eq!(agent.state(&["--facts", "missing"]).0, Some(2));
     let mut running = agent.start(&["--on-term", "end"]);
@@ -153,7 +163,7 @@ fn a_second_process_and_another_program_are_refused() {
     agent.folder.file("agent.esl", AGENT.replace("\"~?~%\"", "\"~?.~%\""));
     let (status, _, errors) = agent.run(&[]);
     assert_eq!(status, Some(2));
-    assert!(errors.contains("another program: changed: SAY"), "{errors}");
+    assert!(errors.contains("another program: changed functions: SAY;"), "{errors}");
     agent.folder.file("agent.esl", AGENT);
     for (options, why) in [(&["--seed", "4"][..], "limits"), (&["--trace", "tasks"][..], "traces")] {
         let (status, _, errors) = agent.run(options);

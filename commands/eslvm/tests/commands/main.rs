@@ -18,6 +18,7 @@ mod deadlock;
 mod documents;
 #[cfg(unix)]
 mod durable;
+mod durable_upgrades;
 mod endings;
 mod examples;
 mod exploring;

@@ -51,6 +51,7 @@ mod cookbook {
         robots = "robots.md",
         tasks = "tasks.md",
         tests = "tests.md",
+        upgrades = "upgrades.md",
     }
 }
 

@@ -6,10 +6,15 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use clap::Args;
 use esl::host::{ProcessSignal, RealHost, SurveyRequest};
 use esl::module_path::ModulePath;
-use esl::program::{self, Instrumentation};
-use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain, say};
+use esl::program::{self, Instrumentation, Modules};
+use esl_command::{
+    DIVERGED, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain, print_diagnostics, read_program, say,
+    say_part, wants_color,
+};
+use esl_compiler::diagnostic::{Format, Renderer, Sources};
 use esl_durable::{
-    Downtime, Durability, DurableError, DurableOptions, DurableRun, DurableState, Resumed, look,
+    Downtime, Durability, DurableError, DurableOptions, DurableRun, DurableState, Resumed, UpgradeReport,
+    look,
 };
 use esl_replay::RunSetup;
 use esl_vm::vm::Tier;
@@ -17,8 +22,8 @@ use eslvm::operate::tell_manager;
 use eslvm::signal::{SignalTarget, end_on_signal_unless};
 
 use crate::figures::print_stats;
-use crate::options::{ClockChoice, MachineOptions};
-use crate::program::{complain_of_signal, program};
+use crate::options::{ClockChoice, LibraryOption, MachineOptions};
+use crate::program::{complain_of_signal, program_with_sources};
 use crate::run::RunReports;
 
 /// Options of a durable run.
@@ -40,6 +45,10 @@ pub(crate) struct StateOptions {
     /// Pause a durable run at SIGTERM, so that the same command goes on, or end it with its cleanups
     #[arg(long, value_enum, default_value = "pause", requires = "state", value_name = "ACTION")]
     pub(crate) on_term: OnTerm,
+    /// Make the changed definitions of the program in the durable run, before it goes on, if its program is
+    /// another one
+    #[arg(long, requires = "state")]
+    pub(crate) upgrade: bool,
 }
 
 /// The events that a durable run survives.
@@ -75,6 +84,17 @@ pub(crate) struct LookOptions {
     /// Show the facts of this relation
     #[arg(long, value_name = "NAME")]
     facts: Option<String>,
+    /// Show the tasks as a tree
+    #[arg(long, conflicts_with = "facts")]
+    tasks: bool,
+    /// Show the processes of the run, its pauses and its upgrades
+    #[arg(long, conflicts_with_all = ["facts", "tasks"])]
+    log: bool,
+    /// Show the changes of this program, and try an upgrade to it on a copy of the run
+    #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["facts", "tasks", "log"])]
+    upgrade: Option<std::path::PathBuf>,
+    #[command(flatten)]
+    modules: LibraryOption,
     /// Folder of a durable run
     #[arg(value_name = "FOLDER")]
     folder: std::path::PathBuf,
@@ -123,14 +143,17 @@ pub(crate) fn run_durable(
         DurabilityChoice::Process => Durability::Process,
         DurabilityChoice::Power => Durability::Power,
     };
-    let run = DurableRun::open(folder, DurableOptions { durability, downtime }).map_err(refuse)?;
+    let mut run = DurableRun::open(folder, DurableOptions { durability, downtime }).map_err(refuse)?;
     let (signals, control) = (SignalTarget::default(), run.control());
     let pauses = state.on_term == OnTerm::Pause;
     end_on_signal_unless(signals.clone(), move |signal| {
         pauses && signal == ProcessSignal::Terminate && control.pause()
     });
     run.control().on_resume(say_resumed);
-    let (program, _) = program(file, path, options, Instrumentation::None, reports.is_quiet, &signals)?;
+    run.control().on_upgrade(say_upgraded);
+    let (program, sources, _) =
+        program_with_sources(file, path, options, Instrumentation::None, reports.is_quiet, &signals)?;
+    let program = run.choose_program(&program, &sources, state.upgrade).map_err(refuse)?;
     if run.arguments().is_some_and(|known| known != arguments) {
         return Err(refused(&DurableError::OtherSettings("other arguments of the program")));
     }
@@ -143,6 +166,8 @@ pub(crate) fn run_durable(
     };
     let host = run.host(host.with_elapsed(run.elapsed()));
     let mut machine = program::machine(options.config(), Box::new(host)).map_err(setup)?;
+    // That part of the library makes upgrades.
+    program::load_operators(&mut machine).map_err(setup)?;
     if !is_virtual {
         esl_world::install_operations(&mut machine);
     }
@@ -221,19 +246,92 @@ fn say_resumed(resumed: &Resumed) {
     complain(text);
 }
 
+/// Reports the effects of an upgrade.
+fn say_upgraded(report: &UpgradeReport) {
+    complain(upgrade_text("upgraded", report));
+}
+
+/// Returns a text about an upgrade that is or would be made.
+fn upgrade_text(made: &str, report: &UpgradeReport) -> String {
+    let counted = |count: usize, noun: &str| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
+    let mut text = format!("{made}: {}", counted(report.definitions, "definition"));
+    if report.structures > 0 {
+        text += &format!(", new slots in {}", counted(report.structures, "structure"));
+    }
+    if !report.left_out.is_empty() {
+        let first_line = |form: &String| {
+            let line = form.lines().next().unwrap_or_default();
+            if form.lines().count() > 1 { format!("`{line} …`") } else { format!("`{line}`") }
+        };
+        let forms: Vec<String> = report.left_out.iter().take(4).map(first_line).collect();
+        let more = if report.left_out.len() > forms.len() { " and others" } else { "" };
+        text += &format!("; not definitions, and not run: {}{more}", forms.join(", "));
+    }
+    text
+}
+
 /// Shows a durable run at the end of its journal. Returns the exit status.
 ///
 /// # Errors
 /// The exit status, after a message.
 pub(crate) fn run_state(options: &LookOptions) -> Result<u8, u8> {
+    if let Some(program) = &options.upgrade {
+        return check_upgrade(&options.folder, program, &options.modules.library);
+    }
     let mut state = look(&options.folder).map_err(|error| refused(&error))?;
     match &options.facts {
-        Some(name) => print_facts(&mut state, name),
-        None => {
-            print_state(&mut state);
-            Ok(SUCCESS)
+        Some(name) => return print_facts(&mut state, name),
+        None if options.tasks => print_tasks(&mut state),
+        None if options.log => print_log(&state),
+        None => print_state(&mut state),
+    }
+    Ok(SUCCESS)
+}
+
+/// Shows the changes of a program, and tries an upgrade to it on a copy of the run. Returns the exit status.
+fn check_upgrade(folder: &Path, file: &Path, library: &[std::path::PathBuf]) -> Result<u8, u8> {
+    let refuse = |error: DurableError| refused(&error);
+    let run = DurableRun::open_to_look(folder).map_err(refuse)?;
+    let (program, sources) = match read_program(file)? {
+        ProgramFile::Compiled(program) => (program, Sources::new()),
+        ProgramFile::Source(source) => {
+            let path = ModulePath::new([file], library);
+            let compiled = program::compile_with(&[source], &path, Modules::Inside);
+            print_diagnostics(&compiled, &Renderer { color: wants_color(), format: Format::Human });
+            (compiled.program.ok_or(NOT_COMPILED)?, compiled.sources)
+        }
+    };
+    let Some(changes) = run.changes_to(&program, &sources).map_err(refuse)? else {
+        say!("the run has this program");
+        return Ok(SUCCESS);
+    };
+    say!("{changes}");
+    let report = run.try_upgrade(&program, &changes).map_err(refuse)?;
+    say!("{}", upgrade_text("on a copy of the run", &report));
+    Ok(SUCCESS)
+}
+
+/// Prints the tasks as a tree.
+fn print_tasks(state: &mut DurableState) {
+    let request = SurveyRequest { tasks: 100_000, ..SurveyRequest::default() };
+    say_part!("{}", state.survey(&request).tree_text());
+}
+
+/// Prints the processes of the run, its pauses and its upgrades.
+fn print_log(state: &DurableState) {
+    for life in &state.lives {
+        let date = date_of(UNIX_EPOCH + Duration::from_nanos(u64::try_from(life.wall).unwrap_or(0)));
+        let event = if life.is_pause { "paused in" } else { "begun by" };
+        say!("{date}  {event} process {}", life.number);
+        if !life.is_pause && state.upgrades.contains(&life.number) {
+            say!("{date}  upgraded in process {}", life.number);
         }
     }
+}
+
+/// Returns a time as a date of UTC.
+fn date_of(time: SystemTime) -> String {
+    humantime::format_rfc3339_seconds(time).to_string()
 }
 
 /// Prints the facts of a relation. Returns the exit status.
@@ -291,8 +389,11 @@ fn print_state(state: &mut DurableState) {
     );
     if let Some(written) = state.written {
         let since = SystemTime::now().duration_since(written).unwrap_or(Duration::ZERO);
-        let date = written.duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
-        say!("written: {} s ago, {date} s since 1970", since.as_secs());
+        let since = humantime::format_duration(Duration::from_secs(since.as_secs()));
+        say!("written: {}, {since} ago", date_of(written));
+    }
+    if !state.upgrades.is_empty() {
+        say!("upgrades: {}", state.upgrades.len());
     }
     say!("verified: the run takes the course of its journal");
 }

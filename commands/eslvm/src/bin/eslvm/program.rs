@@ -7,7 +7,7 @@ use esl::module_path::ModulePath;
 use esl::program::{self, Compiled, Ended, Instrumentation, Program};
 use esl_command as command;
 use esl_command::{NOT_COMPILED, ProgramFile, USAGE, complain};
-use esl_compiler::diagnostic::{Format, Renderer};
+use esl_compiler::diagnostic::{Format, Renderer, Sources};
 use esl_testing::coverage::Coverage;
 use eslvm::signal::SignalTarget;
 
@@ -26,6 +26,23 @@ pub(crate) fn program(
     is_quiet: bool,
     signals: &SignalTarget,
 ) -> Result<(Program, Option<Coverage>), u8> {
+    let (program, _, coverage) =
+        program_with_sources(file, path, options, instrumentation, is_quiet, signals)?;
+    Ok((program, coverage))
+}
+
+/// As [`program`]. Returns the sources of the program too; none of a compiled one.
+///
+/// # Errors
+/// The exit status, after a message.
+pub(crate) fn program_with_sources(
+    file: &Path,
+    path: &ModulePath,
+    options: &MachineOptions,
+    instrumentation: Instrumentation,
+    is_quiet: bool,
+    signals: &SignalTarget,
+) -> Result<(Program, Sources, Option<Coverage>), u8> {
     let is_covered = instrumentation == Instrumentation::Passages;
     let source = match command::read_program(file)? {
         ProgramFile::Compiled(_) if is_covered => return Err(command::refuse_compiled(file)),
@@ -33,7 +50,7 @@ pub(crate) fn program(
             complain(format_args!("{} is compiled; a strict schedule needs its source", file.display()));
             return Err(USAGE);
         }
-        ProgramFile::Compiled(program) => return Ok((program, None)),
+        ProgramFile::Compiled(program) => return Ok((program, Sources::new(), None)),
         ProgramFile::Source(source) => source,
     };
     let mut watch = |inbox| signals.set(inbox);
@@ -53,7 +70,7 @@ pub(crate) fn program(
     let color = command::wants_color();
     command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
     let coverage = is_covered.then(|| Coverage::new(&compiled));
-    Ok((compiled.program.ok_or(NOT_COMPILED)?, coverage))
+    Ok((compiled.program.ok_or(NOT_COMPILED)?, compiled.sources, coverage))
 }
 
 /// Compiles a program, and says at a terminal that it takes long, if it does.
