@@ -91,4 +91,10 @@ mod tests {
     fn every_function_of_the_host_is_called_by_a_module() {
         assert_eq!(unused_functions(MODULES), [""; 0]);
     }
+
+    #[test]
+    fn the_machine_knows_these_modules_without_them() {
+        let feature = |module: &HostModule| esl_world::feature_with_module(module.name);
+        assert!(MODULES.iter().all(|module| feature(module) == Some("robots")));
+    }
 }

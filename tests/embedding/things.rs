@@ -7,7 +7,7 @@ use esl::{Config, Engine};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::check;
+use super::{check, engine};
 
 /// Something of Rust's that counts how many there are.
 struct Motor {
@@ -186,4 +186,14 @@ fn data_without_room_fail_their_own_call() {
     engine.handle().signal("news", [text.into()]).expect("the program has the input");
     engine.handle().signal("news", [1_i64.into()]).expect("the program has the input");
     check(&mut engine, "(list (multiple-value-list (wait-for-event news)) (input-dropped news))", "((1) 1)");
+}
+
+#[test]
+fn a_module_of_another_build_is_not_taken_for_a_file_that_may_not_be_read() {
+    let mut engine = engine();
+    check(&mut engine, "(require :json)", "T");
+    let error = engine.eval("(require :ros)").expect_err("no crate has added it").to_string();
+    assert!(error.contains("belongs to the feature robots"), "{error}");
+    let error = engine.eval("(require :shared)").expect_err("the engine may read nothing").to_string();
+    assert!(error.contains("not permitted"), "{error}");
 }

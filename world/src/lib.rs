@@ -46,7 +46,7 @@ mod ws;
 use esl_vm::vm::Vm;
 
 pub use event_loop::{NoEventLoop, spawn};
-pub use modules::{add_modules, feature_of_module, module, module_names};
+pub use modules::{add_modules, feature_of_module, feature_with_module, module, module_names};
 pub use operation::{Cancelled, ready_soon, spawned, to_its_end};
 pub use socket::socket_failure;
 #[cfg(feature = "tls")]

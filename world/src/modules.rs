@@ -36,8 +36,10 @@ const OF_THE_LIBRARY: &[fn(&Inbox) -> HostRows] = &[
 /// The modules of other crates.
 static ADDED: RwLock<Vec<&'static HostModule>> = RwLock::new(Vec::new());
 
-/// Modules of crates that a program may lack, and the feature of the commands that adds them.
-const OPTIONAL: &[(&str, &str)] = &[("mcap", "robots"), ("ros", "robots"), ("zenoh", "robots")];
+/// Modules of crates that a program may lack, and the feature of the commands that adds them. Those that begin
+/// with such a name and a hyphen are parts of them.
+const OPTIONAL: &[(&str, &str)] =
+    &[("mavlink", "robots"), ("mcap", "robots"), ("ros", "robots"), ("zenoh", "robots")];
 
 /// Adds modules of other crates for all machines that this process makes from now on, and for its
 /// compilations. A module in place of an earlier one of its name wins.
@@ -70,11 +72,17 @@ fn find(name: &str) -> Option<&'static HostModule> {
     modules().into_iter().find(|module| module.name.eq_ignore_ascii_case(name))
 }
 
+/// Returns the feature of the commands that adds the module of this name, in any case.
+pub fn feature_with_module(name: &str) -> Option<&'static str> {
+    let whole = name.split('-').next().unwrap_or(name);
+    let (_, feature) = OPTIONAL.iter().find(|(known, _)| known.eq_ignore_ascii_case(whole))?;
+    Some(feature)
+}
+
 /// Returns the feature of the commands that adds the module of this name, in any case, if this process lacks
 /// it.
 pub fn feature_of_module(name: &str) -> Option<&'static str> {
-    let (_, feature) = OPTIONAL.iter().find(|(known, _)| known.eq_ignore_ascii_case(name))?;
-    find(name).is_none().then_some(feature)
+    feature_with_module(name).filter(|_| find(name).is_none())
 }
 
 /// Returns the text of the module of this name, in any case.
@@ -167,7 +175,8 @@ mod tests {
     #[test]
     fn a_missing_module_of_a_feature_names_the_feature() {
         assert_eq!((feature_of_module("ROS"), feature_of_module("json")), (Some("robots"), None));
-        assert_eq!(feature_of_module("no-such-module"), None);
+        assert_eq!((feature_of_module("no-such-module"), feature_of_module("rosary")), (None, None));
+        assert_eq!(feature_of_module("mavlink-missions"), Some("robots"));
     }
 
     #[test]
