@@ -23,22 +23,22 @@
 pub mod coverage;
 pub mod explore;
 
-use std::cell::RefCell;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use esl::Data;
 use esl::Error;
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Program};
 use esl_bytecode::datum::Datum;
-use esl_host::{Host, RealHost, Rights, VirtualHost};
+use esl_host::{Captured, Host, RealHost, Rights, VirtualHost};
 use esl_vm::explore::{Exploration, Grain, Settings, TimerGrain};
 use esl_vm::task::TaskId;
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
 
 use crate::coverage::Coverage;
-use crate::explore::{ExplorationScope, grains};
+use crate::explore::{ExplorationScope, grains, reads_clock};
 
 /// Statuses with which the library's `%run-test` ends a run.
 const ALL_HELD: u8 = 100;
@@ -58,6 +58,8 @@ pub struct Setup {
     pub coverage: Option<Arc<Mutex<Coverage>>>,
     /// Whether reports of failures show all calls of the library.
     pub is_full: bool,
+    /// The program as [`program::compile_with_points`] compiles it, for tests that are explored strictly.
+    pub with_points: Option<Arc<Program>>,
 }
 
 impl Setup {
@@ -79,6 +81,8 @@ pub struct Test {
     pub seeds: u64,
     /// How to run it under all schedules, if that is what it is for.
     pub explores: Option<ExploreOptions>,
+    /// Whether it is run under all schedules unasked, if these are few.
+    pub may_explore: bool,
     /// Where its body begins, as `file:line:column`; empty if that is not known.
     pub place: String,
 }
@@ -92,6 +96,8 @@ pub struct ExploreOptions {
     pub timers: Option<TimerGrain>,
     /// Most states.
     pub states: Option<usize>,
+    /// Whether tasks also stop before each use of a place that others may reach.
+    pub strict: bool,
 }
 
 /// The outcome of a test.
@@ -149,6 +155,7 @@ pub fn list(program: &Program, setup: &Setup) -> Result<Vec<Test>, Error> {
             name: name.clone(),
             seeds: u64::try_from(*seeds).ok()?,
             explores: explore_options(explores),
+            may_explore: explores.as_list().is_some_and(<[Data]>::is_empty),
             place: place.clone(),
         }),
         _ => None,
@@ -158,7 +165,7 @@ pub fn list(program: &Program, setup: &Setup) -> Result<Vec<Test>, Error> {
 
 /// Returns how a test is explored, as the library has noted it.
 fn explore_options(noted: &Data) -> Option<ExploreOptions> {
-    let Some([grain, timers, states]) = noted.as_list() else { return None };
+    let Some([grain, timers, states, strict]) = noted.as_list() else { return None };
     let name = |data: &Data| match data {
         Data::String(name) => Some(name.clone()),
         _ => None,
@@ -171,6 +178,7 @@ fn explore_options(noted: &Data) -> Option<ExploreOptions> {
         grain: name(grain).and_then(|name| Grain::from_name(&name)),
         timers: name(timers).and_then(|name| TimerGrain::from_name(&name)),
         states,
+        strict: !strict.as_list().is_some_and(<[Data]>::is_empty),
     })
 }
 
@@ -203,23 +211,130 @@ pub fn run_test(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Res
     if let Some(options) = test.explores {
         return explore(program, test, options, setup);
     }
+    run_once(program, test, seed, setup).map(|(verdict, _)| verdict)
+}
+
+/// Runs a test once. Returns what became of it, and whether it has made tasks.
+fn run_once(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Result<(Verdict, bool), Error> {
     let written = Written::default();
     let (mut machine, main) = begin(program, test, seed, setup, Box::new(written.host(setup)))?;
     let outcome = machine.run(u64::MAX);
     let ended = program::end(&mut machine, main, outcome);
     program::end_rest(&mut machine);
     setup.note_passages(&mut machine);
-    Ok(verdict(ended, || written.text()))
+    let (made, ..) = machine.tasks_turns_and_switches();
+    Ok((verdict(ended, || written.text()), made > 1))
 }
 
-/// Runs a test under all schedules: at the grain that is asked for, or at those that show most.
+/// Most states of a test that is explored unasked.
+const FEW_STATES: usize = 2_000;
+
+/// Bytes that such an exploration may take.
+const LITTLE_MEMORY: usize = 1 << 27;
+
+/// Runs a test once, and then under all schedules, if it has made tasks, its schedules are few, and they are
+/// tried in so much time, from which the time of the exploration is taken.
+///
+/// # Errors
+/// As [`run_test`].
+pub fn run_and_explore(
+    program: &Program,
+    test: &Test,
+    setup: &Setup,
+    time: &mut Duration,
+) -> Result<Verdict, Error> {
+    let (verdict, has_tasks) = run_once(program, test, 0, setup)?;
+    if verdict != Verdict::Passed || !test.may_explore || !has_tasks || time.is_zero() {
+        return Ok(verdict);
+    }
+    let started = Instant::now();
+    let found = explore_if_small(program, test, setup, *time);
+    *time = time.saturating_sub(started.elapsed());
+    Ok(found?.unwrap_or(verdict))
+}
+
+/// Explores a test. Returns `None` if it has too many schedules, or needs an outside that explorations do not
+/// have.
+fn explore_if_small(
+    program: &Program,
+    test: &Test,
+    setup: &Setup,
+    time: Duration,
+) -> Result<Option<Verdict>, Error> {
+    let started = Instant::now();
+    let mut complete = None;
+    for grain in grains(program, None) {
+        let few =
+            Settings { states: FEW_STATES, memory: LITTLE_MEMORY, output: false, ..Settings::default() };
+        let settings = Settings { grain, ..few };
+        let found = explore_at(program, test, &settings, setup, &mut || started.elapsed() < time)?;
+        // The first schedule is about the one that has passed with the outside of the test.
+        let first = found.endings.first().map(|ending| &ending.what);
+        if first.is_some_and(|verdict| *verdict != Verdict::Passed) {
+            return Ok(None);
+        }
+        let scope = ExplorationScope::new(program, &settings, &found);
+        if let Some(ending) = found.endings.iter().find(|ending| ending.what != Verdict::Passed) {
+            let written = Written::default();
+            let (mut machine, main) = begin(program, test, 0, setup, Box::new(written.host(setup)))?;
+            let outcome = machine.follow(&settings, &ending.choices);
+            let ended = program::end(&mut machine, main, outcome);
+            let again = verdict(ended, || written.text());
+            return Ok(match again {
+                Verdict::Failed { why, output } => {
+                    Some(Verdict::Failed { why: format!("under a schedule, {why} ({scope})"), output })
+                }
+                _ => None,
+            });
+        }
+        if found.endless.is_some() {
+            let why = format!("a schedule leads to where it never ends ({scope})");
+            return Ok(Some(Verdict::Failed { why, output: String::new() }));
+        }
+        if found.limit.is_some() || found.livelock.is_some() {
+            return Ok(None);
+        }
+        complete = scope.is_complete().then_some(found.states);
+    }
+    Ok(complete.map(|states| Verdict::PassedAll(format!("explored: complete, {states} states"))))
+}
+
+/// Runs a test under all schedules: at the grain that is asked for, or at those that show most; and strictly, if
+/// that is asked for.
 fn explore(program: &Program, test: &Test, options: ExploreOptions, setup: &Setup) -> Result<Verdict, Error> {
+    let verdict = explore_grains(program, test, options, setup)?;
+    if !options.strict || matches!(verdict, Verdict::Failed { .. }) {
+        return Ok(verdict);
+    }
+    let Some(marked) = &setup.with_points else {
+        let why = "`:strict` needs the source of the program".into();
+        return Ok(Verdict::Failed { why, output: String::new() });
+    };
+    Ok(match (explore_grains(marked, test, options, setup)?, verdict) {
+        (Verdict::Failed { why, output }, _) => {
+            Verdict::Failed { why: format!("with switches before each use of a shared place, {why}"), output }
+        }
+        (Verdict::PassedAll(strictly), Verdict::PassedAll(how)) => {
+            Verdict::PassedAll(format!("{how}; not fragile: {strictly}"))
+        }
+        (_, verdict) => verdict,
+    })
+}
+
+/// Runs a test under all schedules at one grain after the other; strictly, if the program has points.
+fn explore_grains(
+    program: &Program,
+    test: &Test,
+    options: ExploreOptions,
+    setup: &Setup,
+) -> Result<Verdict, Error> {
+    let strict = setup.with_points.as_ref().is_some_and(|marked| std::ptr::eq(&**marked, program));
     let states = options.states.unwrap_or(Settings::default().states);
     let timers = options.timers.unwrap_or_default();
     let mut verdict = Verdict::Passed;
     for grain in grains(program, options.grain) {
-        let settings = Settings { grain, timers, states, output: false, ..Settings::default() };
-        let found = explore_at(program, test, &settings, setup)?;
+        let settings = Settings { grain, timers, states, strict, output: false, ..Settings::default() };
+        let found = explore_at(program, test, &settings, setup, &mut || true)?;
         let scope = ExplorationScope::new(program, &settings, &found);
         let failed = |why: &str, output| Verdict::Failed { why: format!("{why} ({scope})"), output };
         let badly = found.endings.into_iter().find(|ending| ending.what != Verdict::Passed);
@@ -254,30 +369,29 @@ fn unproved(before: &Verdict) -> String {
     }
 }
 
-/// Runs a test under all schedules, with these settings.
+/// Runs a test under all schedules, with these settings, for as long as `goes_on`.
 fn explore_at(
     program: &Program,
     test: &Test,
     settings: &Settings,
     setup: &Setup,
+    goes_on: &mut dyn FnMut() -> bool,
 ) -> Result<Exploration<Verdict>, Error> {
-    let present = RefCell::new(None);
     let begin = || {
         let host = VirtualHost::new();
         let captured = host.captured();
         let config = Config { snapshots: true, ..setup.config.clone() };
         let setup = Setup { config, ..setup.clone() };
         let (machine, main) = begin(program, test, 0, &setup, Box::new(host))?;
-        present.replace(Some((main, captured)));
-        Ok::<Vm, Error>(machine)
+        Ok::<_, Error>((machine, (main, captured)))
     };
-    esl_vm::explore::explore(settings, begin, |machine, outcome| {
-        let present = present.borrow();
-        let (main, captured) = present.as_ref().expect("a machine that has run was begun");
+    let judge = |machine: &mut Vm, (main, captured): &(TaskId, Captured), outcome| {
         let ended = program::end(machine, *main, outcome);
         setup.note_passages(machine);
         verdict(ended, || captured.output() + &captured.error())
-    })
+    };
+    let settings = &Settings { clock: settings.clock || reads_clock(program), ..*settings };
+    esl_vm::explore::explore_while(settings, begin, judge, |_| goes_on())
 }
 
 /// Returns what became of a test whose run has ended so.

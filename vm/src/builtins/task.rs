@@ -276,6 +276,7 @@ pub(super) fn set_held(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let function = vm.callable(arguments[0])?;
+    vm.scheduler.points.has_guards = true;
     let height = vm.scheduler.task().control.get().map_or(0, |control| control.entries.len());
     let mut slots = [Value::NIL; guard::LENGTH];
     slots[guard::RIGHTS] = rights_in_force(vm);

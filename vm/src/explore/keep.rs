@@ -129,7 +129,7 @@ impl<'a> Keeper<'a> {
         self.fingerprints.begin_machine();
         let run = PointRun::begin(&mut machine, self.settings);
         self.start = self.save(&mut machine, run);
-        let choices = search.choices(place);
+        let choices = search.choices_after(ROOT, place);
         self.followed = choices.len();
         Ok((machine, run, choices))
     }

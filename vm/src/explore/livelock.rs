@@ -26,6 +26,8 @@ pub(super) struct StateTasks {
     pub(super) ways: u16,
     /// Rank of the task that ran last, when the state was reached first.
     pub(super) last: u8,
+    /// Number of points with a choice that were left out between the last choice and the state, then.
+    pub(super) skipped: u32,
 }
 
 /// The cause of a step from a state to the next.
@@ -45,6 +47,8 @@ pub(super) struct StateStep {
     pub(super) from: u32,
     pub(super) to: u32,
     pub(super) cause: StepCause,
+    /// Number of points with a choice that were left out on the way.
+    pub(super) skipped: u32,
 }
 
 /// A fair way round: the state at which it begins and ends, and the choices on it.
@@ -238,7 +242,7 @@ impl<'a> StateGraph<'a> {
     fn choices_of(&self, first: u32, steps: &[StateStep]) -> Vec<u32> {
         let mut last = self.tasks[first as usize].last;
         let mut choices = Vec::new();
-        for StateStep { from, cause, .. } in steps {
+        for StateStep { from, cause, skipped, .. } in steps {
             let StateTasks { able, ways, .. } = self.tasks[*from as usize];
             let tasks = able & !(1 << TIME);
             let count = tasks.count_ones() + u32::from(self.has_timers && able >> TIME == 1);
@@ -260,6 +264,7 @@ impl<'a> StateGraph<'a> {
             if cause.ran < TIME {
                 last = cause.ran;
             }
+            choices.extend(std::iter::repeat_n(0, *skipped as usize));
         }
         choices
     }
@@ -270,11 +275,11 @@ mod tests {
     use super::*;
 
     fn state(able: u64) -> StateTasks {
-        StateTasks { able, ways: 0, last: 0 }
+        StateTasks { able, ways: 0, last: 0, skipped: 0 }
     }
 
     fn step(from: u32, to: u32, ran: u8) -> StateStep {
-        StateStep { from, to, cause: StepCause { ran, way: 0, keeps_tasks: true } }
+        StateStep { from, to, cause: StepCause { ran, way: 0, keeps_tasks: true }, skipped: 0 }
     }
 
     fn lap(tasks: &[StateTasks], steps: &[StateStep]) -> Option<FairLap> {
@@ -308,7 +313,10 @@ mod tests {
     #[test]
     fn a_choice_that_leads_out_is_made_at_some_time() {
         let asks = StateTasks { ways: 2, ..state(1) };
-        let way = |from, to, way| StateStep { from, to, cause: StepCause { ran: 0, way, keeps_tasks: true } };
+        let way = |from, to, way| {
+            let cause = StepCause { ran: 0, way, keeps_tasks: true };
+            StateStep { from, to, cause, skipped: 0 }
+        };
         let leaves = [way(0, 1, 0), way(0, 2, 1), step(1, 0, 0)];
         assert_eq!(lap(&[asks, state(1), state(0)], &leaves), None);
         let stays = [way(0, 1, 0), way(0, 1, 1), step(1, 0, 0)];

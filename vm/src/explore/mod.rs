@@ -11,6 +11,7 @@
 //! worker        this thread, or several, among which the runs are divided
 //! keep          returning to places of that tree
 //! livelock      ways round that are fair to all
+//! races         the variables whose uses need points
 //! random        runs by random priorities
 //! ```
 //!
@@ -19,12 +20,17 @@
 //! changes the database, enters a critical section, asks for an abort, and before its end; with
 //! [`Grain::Reads`] also before it looks at what others do: before it counts signals, asks what became of a
 //! task, or queries the database; with [`Grain::Variables`] also at a tick after it has used a special
-//! variable of the program, and with [`Grain::Ticks`] at every tick. Nothing between two points is visible to
+//! variable, and at each tick inside of a cleanup form or a limit, where an abort or the end of the limit depends on
+//! the place; with [`Grain::Ticks`] at every tick. Nothing between two points is visible to
 //! other tasks by these means, so every schedule of the machine behaves like one of those explored. Places
 //! that tasks share otherwise (slots, elements, pairs, tables, variables that closures share) are seen
 //! only with [`Grain::Ticks`], unless all uses of them are in critical sections, which are one step each. A
 //! caller that calls a search complete has to know that the program has none. Where a program itself chooses,
 //! by `choose`, each way is tried. A task that reaches no point is stopped after [`Settings::turn`] ticks.
+//!
+//! **Points that are left out.** A search at grain `variables` has points only for the variables that runs have
+//! shown to be in a race (see `races`), and begins again when they show another one. The choices of its findings
+//! have those at the points that were left out, too, so [`Vm::follow`] need not know the races.
 //!
 //! **Choices.** At each point any runnable task may continue, whatever its priority (every task has a turn at
 //! some time). The task that has just run comes first, then the others from the oldest to the newest; a
@@ -57,6 +63,7 @@ mod live;
 mod livelock;
 mod numbers;
 mod point;
+mod races;
 mod random;
 mod search;
 mod step;
@@ -72,6 +79,7 @@ use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
 pub use point::FollowedRun;
+use races::{RaceNotes, Races};
 pub use random::{RandomRun, RandomSchedule};
 use search::Search;
 pub use step::{ScheduleEvent, ScheduleStep, StandingTask, Switch, TellStep};
@@ -132,6 +140,9 @@ pub struct Settings {
     /// Whether tasks also stop before each use of a place that others may reach, in a program that was
     /// compiled with points.
     pub strict: bool,
+    /// Whether points are left out, at grain `variables`, whose absence no other task can see. The findings are the
+    /// same without, in more states.
+    pub reduce: bool,
     /// Whether states also differ by the time, because the program reads the clock. Without this, times are
     /// relative to the time of the state. At grain `ticks`, states always differ by it.
     pub clock: bool,
@@ -150,6 +161,7 @@ impl Default for Settings {
             faults: None,
             output: true,
             strict: false,
+            reduce: true,
             clock: false,
         }
     }
@@ -239,6 +251,19 @@ trait Subject {
     fn judge(&mut self, machine: &mut Vm, outcome: RunOutcome) -> Self::Ending;
 }
 
+impl<S: Subject> Subject for &mut S {
+    type Ending = S::Ending;
+    type Error = S::Error;
+
+    fn begin(&mut self) -> Result<Vm, S::Error> {
+        (**self).begin()
+    }
+
+    fn judge(&mut self, machine: &mut Vm, outcome: RunOutcome) -> S::Ending {
+        (**self).judge(machine, outcome)
+    }
+}
+
 /// A subject of two functions, and what the first tells the second of the machine.
 struct TwoFunctions<C, B, J> {
     present: Option<C>,
@@ -293,10 +318,15 @@ pub fn explore_while<C, T: PartialEq + Clone, E>(
     judge: impl FnMut(&mut Vm, &C, RunOutcome) -> T,
     goes_on: impl FnMut(&SearchProgress) -> bool,
 ) -> Result<Exploration<T>, E> {
-    let search = RwLock::new(Search::default());
-    let subject = TwoFunctions { present: None, begin, judge };
-    let mut alone = SingleWorker::new(settings, &search, subject);
-    search_by(settings, &search, &mut alone, goes_on)
+    let mut subject = TwoFunctions { present: None, begin, judge };
+    let (mut races, mut goes_on) = (LearnedRaces::default(), goes_on);
+    loop {
+        let (search, known) = (RwLock::new(Search::default()), races.known.clone());
+        let mut alone = SingleWorker::new(settings, &known, &search, &mut subject);
+        if let Some(found) = search_by(settings, &search, &mut races, &mut alone, &mut goes_on)? {
+            return Ok(found);
+        }
+    }
 }
 
 /// Calls functions in threads of their own and the last one in this thread, and waits for all of them.
@@ -317,29 +347,54 @@ pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
     if jobs <= 1 {
         return explore_while(settings, begin, judge, goes_on);
     }
-    let (search, stop) = (RwLock::new(Search::default()), AtomicBool::new(false));
     let subject = || TwoFunctions { present: None, begin: &begin, judge: &judge };
-    let (pool, works) = WorkerPool::new(jobs, settings, (&search, &stop), &subject);
-    let (mut pool, mut found) = (Some(pool), None);
-    side_by_side(works, &mut || {
-        // The threads end when the pool is dropped.
-        if let Some(mut pool) = pool.take() {
-            found = Some(search_by(settings, &search, &mut pool, &mut goes_on));
+    let mut races = LearnedRaces::default();
+    loop {
+        let (search, stop) = (RwLock::new(Search::default()), AtomicBool::new(false));
+        let known = races.known.clone();
+        let (pool, works) = WorkerPool::new(jobs, (settings, &known), (&search, &stop), &subject);
+        let (mut pool, mut found) = (Some(pool), None);
+        side_by_side(works, &mut || {
+            // The threads end when the pool is dropped.
+            if let Some(mut pool) = pool.take() {
+                found = Some(search_by(settings, &search, &mut races, &mut pool, &mut goes_on));
+            }
+        });
+        if let Some(found) = found.expect("the last function was called")? {
+            return Ok(found);
         }
-    });
-    found.expect("the last function was called")
+    }
+}
+
+/// The races that searches know, and the uses of variables that they have shown.
+#[derive(Default)]
+struct LearnedRaces {
+    known: Races,
+    notes: RaceNotes,
+}
+
+impl LearnedRaces {
+    /// Adds the notes of runs. Returns whether they show races that were not known.
+    fn learn<'n>(&mut self, notes: impl Iterator<Item = &'n RaceNotes>) -> bool {
+        notes.for_each(|notes| self.notes.add(notes));
+        let more = self.notes.beyond(&self.known);
+        let has_more = more.is_some();
+        self.known = more.unwrap_or(std::mem::take(&mut self.known));
+        has_more
+    }
 }
 
 /// Runs of a batch: few enough that the shortest schedules come first, and enough for all threads.
 const BATCH: usize = 64;
 
-/// Searches with the help of workers.
+/// Searches with the help of workers. Returns `None` if runs have shown races that the workers do not know.
 fn search_by<T: PartialEq + Clone, E>(
     settings: &Settings,
     search: &RwLock<Search>,
+    races: &mut LearnedRaces,
     workers: &mut dyn Workers<T, E>,
-    mut goes_on: impl FnMut(&SearchProgress) -> bool,
-) -> Result<Exploration<T>, E> {
+    goes_on: &mut dyn FnMut(&SearchProgress) -> bool,
+) -> Result<Option<Exploration<T>>, E> {
     let write = || search.write().unwrap_or_else(PoisonError::into_inner);
     write().begin();
     let mut endings: Vec<ExploredEnding<T>> = Vec::new();
@@ -356,6 +411,9 @@ fn search_by<T: PartialEq + Clone, E>(
         let mut traces = workers.run(places.clone(), &mut |more| {
             goes_on(&SearchProgress { states: progress.states + more, ..progress })
         })?;
+        if races.learn(traces.iter().map(|trace| &trace.notes)) {
+            return Ok(None);
+        }
         let search = &mut *write();
         search.settled();
         for (number, &RunPlace { node, .. }) in places.iter().enumerate() {
@@ -397,13 +455,13 @@ fn search_by<T: PartialEq + Clone, E>(
     let search = write();
     let ends = if limit.is_none() { search.ending() } else { vec![true; search.places.len()] };
     let stuck = ends.iter().position(|ends| !ends);
-    let endless = stuck.map(|state| search.choices(search.places[state]));
+    let endless = stuck.map(|state| search.choices_to_state(state as u32));
     let (states, has_cycle) = (search.states.len(), search.has_cycle());
     let has_timers = settings.timers == TimerGrain::Any;
     let lap = if has_cycle { search.fair_lap(has_timers, |state| !ends[state as usize]) } else { None };
     let livelock = lap.map(|lap| {
-        let before = search.choices(search.places[lap.state as usize]);
+        let before = search.choices_to_state(lap.state);
         Livelock { lap: before.len(), choices: [before, lap.choices].concat() }
     });
-    Ok(Exploration { states, runs, endings, endless, livelock, has_cycle, limit })
+    Ok(Some(Exploration { states, runs, endings, endless, livelock, has_cycle, limit }))
 }

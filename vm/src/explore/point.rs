@@ -2,6 +2,7 @@
 
 use smallvec::SmallVec;
 
+use super::races::RaceWatch;
 use super::step::{
     Runnable, ScheduleEvent, ScheduleStep, TellStep, is_of_library, switch, tell_step, tell_uses,
 };
@@ -34,7 +35,7 @@ impl Vm {
     pub fn go_on_following(&mut self, followed: &mut FollowedRun, ticks: u64) -> RunOutcome {
         let end = self.scheduler.spent.saturating_add(ticks);
         let FollowedRun { run, choices, made } = followed;
-        let outcome = run.go_on(self, end, &mut |_, _, runnable| {
+        let outcome = run.go_on(self, end, None, &mut |_, _, runnable| {
             if runnable.count() <= 1 {
                 return Some(0);
             }
@@ -53,6 +54,8 @@ impl Vm {
     pub fn end_following(&mut self) {
         self.scheduler.points.grain = None;
         self.scheduler.points.is_strict = false;
+        self.scheduler.points.notes_variables = false;
+        self.scheduler.points.variables = Vec::new();
     }
 
     /// Runs the program from point to point along a list of choices found by [`super::explore`] with the same
@@ -117,7 +120,7 @@ fn follow(
         Some(choice)
     };
     let mut run = PointRun::begin(vm, settings);
-    let outcome = run.go_on(vm, u64::MAX, &mut |vm, _, runnable| next(vm, runnable));
+    let outcome = run.go_on(vm, u64::MAX, None, &mut |vm, _, runnable| next(vm, runnable));
     if let Some(told) = told {
         tell_uses(vm, told);
     }
@@ -130,6 +133,7 @@ fn follow(
 pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.scheduler.points.grain = Some(settings.grain);
     vm.scheduler.points.is_strict = settings.strict;
+    vm.scheduler.points.notes_variables = settings.grain == Grain::Variables;
     // At a tick a task may hold a time that the library has read, such as the deadline of a sleep; relative
     // times do not tell whether that has passed.
     vm.scheduler.points.has_clock = settings.clock || settings.grain == Grain::Ticks;
@@ -154,6 +158,8 @@ pub(super) struct PointRun {
     has_timers: bool,
     /// With [`Grain::Variables`], what is to be known of the way since the last point.
     unseen: Option<UnseenWay>,
+    /// Number of points with a choice that were left out since the last one.
+    skipped: u32,
 }
 
 /// The way of a task since it last stood at a point.
@@ -161,11 +167,18 @@ pub(super) struct PointRun {
 struct UnseenWay {
     /// Number of symbols whose variables are watched.
     watched: usize,
-    /// Ticks since then.
+    /// Ticks since then, or since a point that was left out.
     ticks: u32,
+    /// Ticks since then, if points are left out.
+    all_ticks: u32,
     /// Ticks after which there is a point in any case.
     most: u32,
+    /// Number of tasks at the last tick.
+    alive: usize,
 }
+
+/// Ticks after which a point is no longer left out: a loop that waits for other tasks comes to one soon.
+const MOST_LEFT_OUT: u32 = 1_000;
 
 /// Says which of the tasks continues at a point, or `None` to give up the run.
 pub(super) type Choose<'a> = dyn FnMut(&mut Vm, PointRun, Runnable<'_>) -> Option<u32> + 'a;
@@ -182,9 +195,18 @@ impl PointRun {
             unseen: (settings.grain == Grain::Variables).then_some(UnseenWay {
                 watched: 0,
                 ticks: 0,
+                all_ticks: 0,
                 most: settings.turn,
+                alive: 0,
             }),
+            skipped: 0,
         }
+    }
+
+    /// Returns the number of points with a choice that were left out since the last one, at each of which the
+    /// first choice leads here.
+    pub(super) fn skipped(&self) -> u32 {
+        self.skipped
     }
 
     /// Returns the task that ran last.
@@ -194,8 +216,15 @@ impl PointRun {
 
     /// Runs from point to point, up to so many ticks of the whole run; at each, `choose` says which task
     /// continues. It is given the run as it stands, from which [`PointRun::go_on`] comes to the same choice
-    /// again. Returns how the run has ended, unless it was given up.
-    pub(super) fn go_on(&mut self, vm: &mut Vm, end: u64, choose: &mut Choose<'_>) -> Option<RunOutcome> {
+    /// again. With races to watch, points are left out whose absence no other task can see. Returns how the run
+    /// has ended, unless it was given up.
+    pub(super) fn go_on(
+        &mut self,
+        vm: &mut Vm,
+        end: u64,
+        mut races: Option<&mut RaceWatch<'_>>,
+        choose: &mut Choose<'_>,
+    ) -> Option<RunOutcome> {
         loop {
             if vm.scheduler.spent >= end {
                 return Some(RunOutcome::TicksUsed);
@@ -208,7 +237,7 @@ impl PointRun {
                 if let Some(outcome) = self.come_to_point(vm) {
                     return Some(outcome);
                 }
-                if let Some(index) = self.goes_on_unseen(vm) {
+                if let Some(index) = self.goes_on_unseen(vm, races.as_deref_mut()) {
                     run::give_turn(vm, index, end);
                     continue;
                 }
@@ -231,6 +260,7 @@ impl PointRun {
                 let ways = Some(ways as u32);
                 let asking = Runnable { tasks: &tasks, ways, has_last: false, has_timer: false };
                 let way = choose(vm, here, asking)?;
+                self.skipped = 0;
                 vm.scheduler.points.asked = None;
                 vm.scheduler.points.chosen = Some(way as usize);
                 if let Some(&(_, _, index)) = runnable.first().filter(|_| !is_other) {
@@ -244,6 +274,7 @@ impl PointRun {
             let has_timer = self.has_timers && time_may_pass(vm);
             let choice =
                 choose(vm, here, Runnable { tasks: &tasks, ways: None, has_last: !is_other, has_timer })?;
+            self.skipped = 0;
             if has_timer && choice as usize == tasks.len() {
                 run::idle(vm);
                 continue;
@@ -260,23 +291,54 @@ impl PointRun {
 
     /// Returns the task that ran last if it stands at a tick that is not a point: if others have seen nothing
     /// of it since its last point, giving way here would be as giving way there.
-    fn goes_on_unseen(&mut self, vm: &mut Vm) -> Option<TaskIndex> {
+    fn goes_on_unseen(&mut self, vm: &mut Vm, mut races: Option<&mut RaceWatch<'_>>) -> Option<TaskIndex> {
         let way = self.unseen.as_mut()?;
         let symbols = vm.names.symbol_count();
         if way.watched != symbols {
             watch_variables(vm);
             way.watched = symbols;
         }
-        let has_shown = std::mem::take(&mut vm.scheduler.points.has_shown);
+        let points = &mut vm.scheduler.points;
+        let (has_shown, was_hit) =
+            (std::mem::take(&mut points.has_shown), std::mem::take(&mut points.was_hit));
+        let variables = std::mem::take(&mut points.variables);
+        let before = std::mem::replace(&mut way.alive, vm.scheduler.counts.alive);
+        let has_others = before.max(way.alive) > 1;
+        // Whether there is a point here, and whether it cannot be left out.
+        let (mut is_point, mut is_needed) = (has_shown, has_shown || races.is_none());
+        for used in variables {
+            let is_seen = races.as_deref_mut().is_none_or(|races| races.see(vm, used, has_others));
+            if used.task == self.last {
+                is_point = true;
+                is_needed |= is_seen;
+            }
+        }
+        let has_hits = races.is_some_and(|races| {
+            if was_hit {
+                races.note_hit();
+            }
+            races.known.has_hits
+        });
         let ticks = std::mem::take(&mut way.ticks) + 1;
-        if has_shown || ticks >= way.most || vm.scheduler.points.asked.is_some() {
+        let all_ticks = std::mem::take(&mut way.all_ticks) + 1;
+        if vm.scheduler.points.asked.is_some() {
             return None;
         }
         let (_, index) = runnable_tasks(vm).find(|&(number, _)| number == self.last)?;
-        if vm.scheduler.tasks.at(index).is_none_or(|task| task.flags.at_point()) {
+        let task = vm.scheduler.tasks.at(index).filter(|task| !task.flags.at_point())?;
+        let depends_on_place = vm.scheduler.points.has_guards
+            || task.control.get().is_some_and(|control| control.depends_on_place());
+        is_point |= depends_on_place || ticks >= way.most;
+        is_needed |= depends_on_place && has_hits || all_ticks >= MOST_LEFT_OUT;
+        if is_point && is_needed {
             return None;
         }
-        way.ticks = ticks;
+        way.all_ticks = all_ticks;
+        if !is_point {
+            way.ticks = ticks;
+        } else if runnable_tasks(vm).count() > 1 || self.has_timers && time_may_pass(vm) {
+            self.skipped += 1;
+        }
         Some(index)
     }
 

@@ -124,7 +124,7 @@ impl Vm {
         let mut found = RandomRun { outcome: None, choices: Vec::new(), steps: 0, tasks: 0 };
         let mut seen = std::collections::HashSet::new();
         let mut run = PointRun::begin(self, settings);
-        found.outcome = run.go_on(self, u64::MAX, &mut |vm: &mut Vm, _, runnable: Runnable<'_>| {
+        found.outcome = run.go_on(self, u64::MAX, None, &mut |vm: &mut Vm, _, runnable: Runnable<'_>| {
             found.steps += 1;
             if found.steps > MOST_STEPS {
                 return None;

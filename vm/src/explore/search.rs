@@ -6,13 +6,21 @@ use std::collections::hash_map::Entry;
 use super::SearchProgress;
 use super::livelock::{FairLap, StateGraph, StateStep, StateTasks};
 
+/// A choice at a point.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct MadeChoice {
+    pub(super) choice: u32,
+    /// State in which the choice was made.
+    pub(super) state: u32,
+    /// Number of points with a choice that were left out since the choice before.
+    pub(super) skipped: u32,
+}
+
 /// A node in the tree of choices: its last choice, after those of its parent.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ChoiceNode {
     pub(super) parent: u32,
-    pub(super) choice: u32,
-    /// State in which the choice was made.
-    pub(super) state: u32,
+    pub(super) made: MadeChoice,
     /// Number of choices so far, by `choose`, that were not the first form.
     pub(super) faults: u32,
     /// Number of nodes after it that are still to be continued from, or from which a run is under way.
@@ -47,17 +55,17 @@ pub(super) struct Search {
 impl Search {
     /// Opens the first node.
     pub(super) fn begin(&mut self) {
-        self.open(0, (ROOT, 0, 0, 0));
+        self.open(0, (ROOT, MadeChoice::default(), 0));
     }
 
-    /// Adds a node: its parent, its choice, the state of that and the faults so far.
-    pub(super) fn node(&mut self, (parent, choice, state, faults): (u32, u32, u32, u32)) -> u32 {
-        self.nodes.push(ChoiceNode { parent, choice, state, faults, open: 0 });
+    /// Adds a node: its parent, its choice, and the faults so far.
+    pub(super) fn node(&mut self, (parent, made, faults): (u32, MadeChoice, u32)) -> u32 {
+        self.nodes.push(ChoiceNode { parent, made, faults, open: 0 });
         (self.nodes.len() - 1) as u32
     }
 
     /// Adds a node to continue from, after so many preemptions.
-    pub(super) fn open(&mut self, switches: usize, node: (u32, u32, u32, u32)) {
+    pub(super) fn open(&mut self, switches: usize, node: (u32, MadeChoice, u32)) {
         let node = self.node(node);
         self.open_again(switches, node);
     }
@@ -128,21 +136,36 @@ impl Search {
         SearchProgress { states: self.states.len(), runs, open, switches, endings }
     }
 
-    /// Returns the choices that lead to a node.
+    /// Returns the choices that lead to a node, with those at points that were left out.
     pub(super) fn choices(&self, node: u32) -> Vec<u32> {
-        self.choices_after(ROOT, node)
+        let made = self.made_after(ROOT, node);
+        let with_skipped = |made: MadeChoice| {
+            std::iter::repeat_n(0, made.skipped as usize).chain(std::iter::once(made.choice))
+        };
+        made.into_iter().flat_map(with_skipped).collect()
     }
 
-    /// Returns the choices that lead from a node to one after it.
+    /// Returns the choices that lead to a state on the way by which it was reached first, up to the state itself.
+    pub(super) fn choices_to_state(&self, state: u32) -> Vec<u32> {
+        let mut choices = self.choices(self.places[state as usize]);
+        choices.extend(std::iter::repeat_n(0, self.tasks[state as usize].skipped as usize));
+        choices
+    }
+
+    /// Returns the choices that lead from a node to one after it, at the points of the search.
     pub(super) fn choices_after(&self, first: u32, node: u32) -> Vec<u32> {
-        let mut choices = Vec::new();
+        self.made_after(first, node).into_iter().map(|made| made.choice).collect()
+    }
+
+    fn made_after(&self, first: u32, node: u32) -> Vec<MadeChoice> {
+        let mut made = Vec::new();
         let mut at = node;
         while at != first {
-            choices.push(self.nodes[at as usize].choice);
+            made.push(self.nodes[at as usize].made);
             at = self.nodes[at as usize].parent;
         }
-        choices.reverse();
-        choices
+        made.reverse();
+        made
     }
 
     /// Returns of each state whether the end can be reached from it.

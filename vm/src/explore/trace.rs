@@ -6,7 +6,8 @@ use super::Subject;
 use super::keep::Keeper;
 use super::livelock::{NO_TASK, StateStep, StateTasks, StepCause, TIME};
 use super::point::{PointRun, living_tasks};
-use super::search::{ROOT, Search};
+use super::races::{RaceNotes, RaceWatch, Races};
+use super::search::{MadeChoice, ROOT, Search};
 use super::step::Runnable;
 use super::worker::{ClaimedStep, Claims, RunPlace};
 use super::{SearchLimit, Settings};
@@ -53,7 +54,8 @@ impl TasksAtPoint {
         let last = rank(&numbers, run.last());
         let ways = runnable.ways.map_or(0, |ways| u16::try_from(ways).unwrap_or(u16::MAX));
         let has_ways = runnable.ways.is_some();
-        (TasksAtPoint { numbers, has_ways, passes_time: false, choice: 0 }, StateTasks { able, ways, last })
+        let tasks = StateTasks { able, ways, last, skipped: run.skipped() };
+        (TasksAtPoint { numbers, has_ways, passes_time: false, choice: 0 }, tasks)
     }
 
     /// Notes the choice that is made here.
@@ -99,19 +101,22 @@ pub(super) enum TraceEnd<T> {
 pub(super) struct RunTrace<T> {
     pub(super) steps: Vec<TraceStep>,
     pub(super) end: TraceEnd<T>,
+    /// The uses of variables on the way.
+    pub(super) notes: RaceNotes,
 }
 
 /// A machine of a search with its places, and the subject that began it.
 pub(super) struct Tracer<'a, S> {
     settings: &'a Settings,
+    races: &'a Races,
     keeper: Keeper<'a>,
     subject: S,
 }
 
 impl<'a, S: Subject> Tracer<'a, S> {
     /// Creates a tracer that may take so many bytes for snapshots.
-    pub(super) fn new(settings: &'a Settings, memory: usize, subject: S) -> Tracer<'a, S> {
-        Tracer { settings, keeper: Keeper::new(settings, memory), subject }
+    pub(super) fn new(settings: &'a Settings, races: &'a Races, memory: usize, subject: S) -> Tracer<'a, S> {
+        Tracer { settings, races, keeper: Keeper::new(settings, memory), subject }
     }
 
     /// Takes note of what the search has made of the last batch.
@@ -135,7 +140,8 @@ impl<'a, S: Subject> Tracer<'a, S> {
         (number, claims): (usize, &Claims),
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Result<RunTrace<S::Ending>, S::Error> {
-        let Tracer { settings, keeper, subject } = self;
+        let Tracer { settings, races, keeper, subject } = self;
+        let mut watch = RaceWatch::new(races);
         let (mut machine, mut run, choices) = keeper.go_to(search, place.node, || subject.begin())?;
         let parent = search.nodes[place.node as usize].parent;
         let mut given = choices.into_iter();
@@ -143,7 +149,8 @@ impl<'a, S: Subject> Tracer<'a, S> {
         let mut end = TraceEnd::Known;
         let mut before: Option<TasksAtPoint> = None;
         let most = settings.states.min(settings.memory / STEP_BYTES);
-        let outcome = run.go_on(&mut machine, u64::MAX, &mut |vm, run, runnable| {
+        let watched = settings.reduce.then_some(&mut watch);
+        let outcome = run.go_on(&mut machine, u64::MAX, watched, &mut |vm, run, runnable| {
             if given.len() == 1 && runnable.count() > 1 {
                 keeper.keep_on_the_way(vm, run, search, parent);
             }
@@ -187,7 +194,7 @@ impl<'a, S: Subject> Tracer<'a, S> {
             end = TraceEnd::Ended(subject.judge(&mut machine, outcome));
         }
         keeper.take_back(machine);
-        Ok(RunTrace { steps, end })
+        Ok(RunTrace { steps, end, notes: watch.notes })
     }
 }
 
@@ -205,6 +212,8 @@ pub(super) struct Merging<'a> {
 pub(super) struct MergePlace {
     pub(super) node: u32,
     pub(super) before: Option<u32>,
+    /// Number of points that were left out since the last choice.
+    pub(super) skipped: u32,
 }
 
 /// The outcome of merging the steps of a run.
@@ -227,9 +236,12 @@ impl Merging<'_> {
         (serial, steps, first): (u64, &[TraceStep], usize),
     ) -> Merged {
         for (step, at) in steps.iter().zip(0..).skip(first) {
-            let (state, is_new) = search.state(step.state, place.node, step.tasks);
+            let skipped = step.tasks.skipped;
+            place.skipped += skipped;
+            let tasks = StateTasks { skipped: place.skipped, ..step.tasks };
+            let (state, is_new) = search.state(step.state, place.node, tasks);
             if let Some(from) = place.before {
-                search.steps.push(StateStep { from, to: state, cause: step.cause });
+                search.steps.push(StateStep { from, to: state, cause: step.cause, skipped });
             }
             if !is_new {
                 return Merged::Known;
@@ -263,17 +275,21 @@ impl Merging<'_> {
             *self.limit = self.limit.or(Some(SearchLimit::Faults));
         } else {
             for choice in (1..step.count).rev() {
-                search.open(switches, (place.node, choice, state, faults));
+                let choice = MadeChoice { choice, state, skipped: place.skipped };
+                search.open(switches, (place.node, choice, faults));
             }
         }
         search.placed.insert(at, place.node);
-        place.node = search.node((place.node, 0, state, before));
+        let choice = MadeChoice { choice: 0, state, skipped: place.skipped };
+        place.node = search.node((place.node, choice, before));
+        place.skipped = 0;
     }
 }
 
 impl MergePlace {
     /// Returns where a run from a node is taken in.
     pub(super) fn of(search: &Search, node: u32) -> MergePlace {
-        MergePlace { node, before: (node != ROOT).then(|| search.nodes[node as usize].state) }
+        let before = (node != ROOT).then(|| search.nodes[node as usize].made.state);
+        MergePlace { node, before, skipped: 0 }
     }
 }

@@ -17,7 +17,7 @@ pub enum Grain {
     /// Also those that look at what others have changed.
     Reads,
     /// Also ticks after something that other tasks can see, among which are reading and setting a special
-    /// variable of the program.
+    /// variable, and ticks inside of forms with a cleanup or a limit.
     #[default]
     Variables,
     /// Also all ticks, which is wherever the machine can preempt a task.
@@ -68,6 +68,17 @@ pub(crate) struct SharedUse {
     pub(crate) place: Option<String>,
 }
 
+/// A use of the global value of a special variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct VariableUse {
+    /// The task.
+    pub(crate) task: TaskNumber,
+    /// The variable, a symbol.
+    pub(crate) symbol: Value,
+    /// Whether the value was set.
+    pub(crate) is_set: bool,
+}
+
 /// Where tasks stop while schedules are explored.
 #[derive(Clone, Default)]
 pub(crate) struct Points {
@@ -77,9 +88,17 @@ pub(crate) struct Points {
     pub(crate) has_clock: bool,
     /// Whether the running task may pass the point at which it stands.
     pub(crate) is_open: bool,
-    /// Whether the running task has passed a point, or used a special variable that is not only the task's
-    /// own, since it last stood at a point.
+    /// Whether the running task has passed a point, or has done something else that other tasks can see, since
+    /// the last tick.
     pub(crate) has_shown: bool,
+    /// Whether uses of special variables are noted.
+    pub(crate) notes_variables: bool,
+    /// The uses of global values of special variables since the last tick.
+    pub(crate) variables: Vec<VariableUse>,
+    /// Whether a request to end or to leave a form, or an interrupt, has reached a task that could run.
+    pub(crate) was_hit: bool,
+    /// Whether there are guards, which may interrupt tasks anywhere.
+    pub(crate) has_guards: bool,
     /// Number of ways among which the task that ran last wants one to be chosen.
     pub(crate) asked: Option<usize>,
     /// The alternative that was chosen for it.
@@ -95,6 +114,14 @@ pub(crate) struct Points {
 }
 
 impl Points {
+    /// Notes a use of the global value of a special variable.
+    #[cold]
+    pub(crate) fn note_variable(&mut self, used: VariableUse) {
+        if !self.variables.contains(&used) {
+            self.variables.push(used);
+        }
+    }
+
     /// Notes that the running task has done something that other tasks can see, or has looked at it.
     #[inline]
     pub(crate) fn note_shown(&mut self) {

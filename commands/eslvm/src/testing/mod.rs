@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use esl::Error;
 use esl::module_path::ModulePath;
-use esl::program::{self, Modules, Program};
+use esl::program::{self, Modules, Program, Source};
 use esl_command as command;
 use esl_command::{
     FAILED, NO_TESTS, NOT_COMPILED, ProgramFile, SUCCESS, StatusLine, USAGE, complain, refuse_compiled, say,
@@ -20,7 +20,7 @@ use esl_command::{
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_host::Rights;
 use esl_testing::coverage::{Coverage, CoverageReport};
-use esl_testing::{Setup, Test, Verdict, list, run_test};
+use esl_testing::{Setup, Test, Verdict, list, run_and_explore, run_test};
 use esl_vm::vm::Config;
 
 /// Which tests to run, and how.
@@ -46,13 +46,46 @@ pub struct Options {
     pub is_quiet: bool,
     /// Whether reports of failures show all calls of the library.
     pub is_full: bool,
+    /// Whether tests of several tasks are explored unasked, if their schedules are few.
+    pub explores: bool,
 }
+
+/// Most time for which the tests of a file are explored unasked, and that for which one of them is.
+const TIME_OF_FILE: Duration = Duration::from_secs(2);
+const TIME_OF_TEST: Duration = Duration::from_millis(500);
 
 /// A file with tests.
 struct Suite<'a> {
     file: &'a Path,
     program: Program,
     setup: Setup,
+    /// The source, unless the file is compiled.
+    source: Option<Source>,
+    /// Time that is left for explorations that were not asked for.
+    time: Mutex<Duration>,
+}
+
+impl Suite<'_> {
+    /// Runs a test once, and under all schedules if these are few.
+    ///
+    /// # Errors
+    /// As [`run_test`].
+    fn run_and_explore(&self, test: &Test) -> Result<Verdict, Error> {
+        let of_file = || self.time.lock().unwrap_or_else(PoisonError::into_inner);
+        let time = TIME_OF_TEST.min(*of_file());
+        let mut left = time;
+        let verdict = run_and_explore(&self.program, test, &self.setup, &mut left);
+        let mut of_file = of_file();
+        *of_file = of_file.saturating_sub(time - left);
+        verdict
+    }
+
+    /// Compiles the program with points, for tests that are explored strictly.
+    fn add_points(&mut self) {
+        let Some(source) = &self.source else { return };
+        let compiled = program::compile_with_points(std::slice::from_ref(source), &self.setup.path);
+        self.setup.with_points = compiled.program.map(Arc::new);
+    }
 }
 
 /// A test of a file, and what became of it.
@@ -164,11 +197,10 @@ fn run_files(found: &TestFiles, library: &[PathBuf], options: &Options) -> Resul
     for output in [&options.junit, &options.coverage].into_iter().flatten() {
         command::refuse_overwriting(output, files.iter().map(PathBuf::as_path))?;
     }
-    let suites =
+    let mut suites =
         files.iter().map(|file| suite(file, library, options)).collect::<Result<Vec<Suite<'_>>, u8>>()?;
-    let mut runs = Vec::new();
-    let mut total = 0;
-    for suite in &suites {
+    let mut lists = Vec::new();
+    for suite in &mut suites {
         let tests = list(&suite.program, &suite.setup).map_err(|error| {
             let reason = match error {
                 Error::BudgetSpent => {
@@ -183,6 +215,14 @@ fn run_files(found: &TestFiles, library: &[PathBuf], options: &Options) -> Resul
         if tests.is_empty() && found.named.iter().any(|named| named == suite.file) {
             complain(format_args!("{} has no tests: `deftest` defines one", suite.file.display()));
         }
+        if tests.iter().any(|test| test.explores.is_some_and(|explores| explores.strict)) {
+            suite.add_points();
+        }
+        lists.push(tests);
+    }
+    let mut runs = Vec::new();
+    let mut total = 0;
+    for (suite, tests) in suites.iter().zip(lists) {
         total += tests.len();
         let wanted = tests.into_iter().filter(|test| is_wanted(test, options.filter.as_deref()));
         runs.extend(wanted.map(|test| Run { suite, test, result: Mutex::default() }));
@@ -270,14 +310,15 @@ fn progress(runs: &[Run<'_>]) -> String {
 /// The exit status, after a message.
 fn suite<'a>(file: &'a Path, library: &[PathBuf], options: &Options) -> Result<Suite<'a>, u8> {
     let path = ModulePath::new([file], library);
-    let mut coverage = None;
+    let (mut coverage, mut source) = (None, None);
     let program = match command::read_program(file)? {
         ProgramFile::Compiled(_) if options.coverage.is_some() => return Err(refuse_compiled(file)),
         ProgramFile::Compiled(program) => program,
-        ProgramFile::Source(source) => {
+        ProgramFile::Source(read) => {
+            let sources = std::slice::from_ref(source.insert(read));
             let compile = || match &options.coverage {
-                Some(_) => program::compile_covered(&[source], &path),
-                None => program::compile_with(&[source], &path, Modules::Inside),
+                Some(_) => program::compile_covered(sources, &path),
+                None => program::compile_with(sources, &path, Modules::Inside),
             };
             let line = || format!("compiling {}", file.display());
             let compiled = StatusLine::new(options.is_quiet).during(line, compile);
@@ -288,8 +329,10 @@ fn suite<'a>(file: &'a Path, library: &[PathBuf], options: &Options) -> Result<S
         }
     };
     let (config, rights) = (options.config.clone(), options.rights.clone());
-    let setup = Setup { config, path, rights, coverage, is_full: options.is_full };
-    Ok(Suite { file, program, setup })
+    let setup = Setup { config, path, rights, coverage, is_full: options.is_full, with_points: None };
+    let explores = options.explores && options.seed.is_none() && options.coverage.is_none();
+    let time = Mutex::new(if explores { TIME_OF_FILE } else { Duration::ZERO });
+    Ok(Suite { file, program, setup, source, time })
 }
 
 fn is_wanted(test: &Test, filter: Option<&str>) -> bool {
@@ -312,7 +355,10 @@ fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
     };
     let mut finished = FinishedTest { verdict: Verdict::Passed, seed: None, time: Duration::ZERO };
     for seed in seeds {
-        let verdict = run_test(&run.suite.program, &run.test, seed, &run.suite.setup);
+        let verdict = match run.test.may_explore {
+            true => run.suite.run_and_explore(&run.test),
+            false => run_test(&run.suite.program, &run.test, seed, &run.suite.setup),
+        };
         let verdict = verdict.unwrap_or_else(|error| Verdict::Failed {
             why: "it cannot be begun".into(),
             output: error.to_string(),

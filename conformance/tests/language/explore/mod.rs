@@ -5,6 +5,7 @@ mod corpus;
 mod defects;
 mod everywhere;
 mod fluents;
+mod generated;
 mod keeping;
 mod oracle;
 mod origins;

@@ -8,7 +8,7 @@ use esl_testing::explore::{
     RandomFound, RandomSettings, Settings, explore, explore_randomly, follow, grains,
 };
 
-use super::{compile, corpus, oracle};
+use super::{compile, corpus, generated, oracle};
 
 fn random(text: &str, random: RandomSettings) -> (Settings, RandomFound) {
     let program = compile(text);
@@ -61,7 +61,7 @@ fn a_seed_means_one_schedule_in_whatever_series() {
 #[test]
 fn random_schedules_end_as_an_exploration_says() {
     for number in 0..oracle::variable("ESL_ORACLE_RANDOM", 12) {
-        let (text, _) = oracle::program(number);
+        let text = generated::program(number).text();
         let (settings, found) = random(&text, RandomSettings { count: 60, ..FEW });
         let all = explore(&compile(&text), &Settings { states: 40_000, ..settings }).expect("it can start");
         if all.limit.is_some() {

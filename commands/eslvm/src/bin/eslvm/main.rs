@@ -131,6 +131,7 @@ fn main() -> ExitCode {
             junit,
             coverage,
             full,
+            no_explore,
             budget,
             memory,
             compiling,
@@ -155,6 +156,7 @@ fn main() -> ExitCode {
                         rights,
                         is_quiet,
                         is_full: full,
+                        explores: !no_explore,
                     },
                 )
             })

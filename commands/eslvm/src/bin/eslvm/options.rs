@@ -163,6 +163,10 @@ pub(crate) enum EslvmAction {
         /// Show all calls of the library in reports of failures, which are folded otherwise
         #[arg(long)]
         full: bool,
+        /// Run no test under all schedules that does not ask for it; without this, a test of several tasks
+        /// whose schedules are few is
+        #[arg(long)]
+        no_explore: bool,
         /// Most ticks of a run of a test
         #[arg(long, value_name = "TICKS", default_value_t = 1_000_000_000)]
         budget: u64,
