@@ -218,12 +218,13 @@ pub fn run_test(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Res
 fn run_once(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Result<(Verdict, bool), Error> {
     let written = Written::default();
     let (mut machine, main) = begin(program, test, seed, setup, Box::new(written.host(setup)))?;
+    let (made_before, ..) = machine.tasks_turns_and_switches();
     let outcome = machine.run(u64::MAX);
     let ended = program::end(&mut machine, main, outcome);
+    let (made, ..) = machine.tasks_turns_and_switches();
     program::end_rest(&mut machine);
     setup.note_passages(&mut machine);
-    let (made, ..) = machine.tasks_turns_and_switches();
-    Ok((verdict(ended, || written.text()), made > 1))
+    Ok((verdict(ended, || written.text()), made > made_before))
 }
 
 /// Most states of a test that is explored unasked.
@@ -233,7 +234,8 @@ const FEW_STATES: usize = 2_000;
 const LITTLE_MEMORY: usize = 1 << 27;
 
 /// Runs a test once, and then under all schedules, if it has made tasks, its schedules are few, and they are
-/// tried in so much time, from which the time of the exploration is taken.
+/// tried in so much time, from which the time of the exploration is taken. Returns also whether the verdict
+/// is that of the exploration.
 ///
 /// # Errors
 /// As [`run_test`].
@@ -242,15 +244,15 @@ pub fn run_and_explore(
     test: &Test,
     setup: &Setup,
     time: &mut Duration,
-) -> Result<Verdict, Error> {
+) -> Result<(Verdict, bool), Error> {
     let (verdict, has_tasks) = run_once(program, test, 0, setup)?;
     if verdict != Verdict::Passed || !test.may_explore || !has_tasks || time.is_zero() {
-        return Ok(verdict);
+        return Ok((verdict, false));
     }
     let started = Instant::now();
     let found = explore_if_small(program, test, setup, *time);
     *time = time.saturating_sub(started.elapsed());
-    Ok(found?.unwrap_or(verdict))
+    Ok(found?.map_or((verdict, false), |found| (found, true)))
 }
 
 /// Explores a test. Returns `None` if it has too many schedules, or needs an outside that explorations do not
@@ -299,8 +301,8 @@ fn explore_if_small(
     Ok(complete.map(|states| Verdict::PassedAll(format!("explored: complete, {states} states"))))
 }
 
-/// Runs a test under all schedules: at the grain that is asked for, or at those that show most; and strictly, if
-/// that is asked for.
+/// Runs a test under all schedules: at the grain that is asked for, or at those that show most; and strictly,
+/// if that is asked for.
 fn explore(program: &Program, test: &Test, options: ExploreOptions, setup: &Setup) -> Result<Verdict, Error> {
     let verdict = explore_grains(program, test, options, setup)?;
     if !options.strict || matches!(verdict, Verdict::Failed { .. }) {

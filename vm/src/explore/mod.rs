@@ -20,17 +20,17 @@
 //! changes the database, enters a critical section, asks for an abort, and before its end; with
 //! [`Grain::Reads`] also before it looks at what others do: before it counts signals, asks what became of a
 //! task, or queries the database; with [`Grain::Variables`] also at a tick after it has used a special
-//! variable, and at each tick inside of a cleanup form or a limit, where an abort or the end of the limit depends on
-//! the place; with [`Grain::Ticks`] at every tick. Nothing between two points is visible to
-//! other tasks by these means, so every schedule of the machine behaves like one of those explored. Places
-//! that tasks share otherwise (slots, elements, pairs, tables, variables that closures share) are seen
-//! only with [`Grain::Ticks`], unless all uses of them are in critical sections, which are one step each. A
-//! caller that calls a search complete has to know that the program has none. Where a program itself chooses,
-//! by `choose`, each way is tried. A task that reaches no point is stopped after [`Settings::turn`] ticks.
+//! variable, and at each tick inside of a cleanup form or a limit, where an abort or the end of the limit
+//! depends on the place; with [`Grain::Ticks`] at every tick. Nothing between two points is visible to other
+//! tasks by these means, so every schedule of the machine behaves like one of those explored. Places that
+//! tasks share otherwise (slots, elements, pairs, tables, variables that closures share) are seen only with
+//! [`Grain::Ticks`], unless all uses of them are in critical sections, which are one step each. A caller that
+//! calls a search complete has to know that the program has none. Where a program itself chooses, by
+//! `choose`, each way is tried. A task that reaches no point is stopped after [`Settings::turn`] ticks.
 //!
-//! **Points that are left out.** A search at grain `variables` has points only for the variables that runs have
-//! shown to be in a race (see `races`), and begins again when they show another one. The choices of its findings
-//! have those at the points that were left out, too, so [`Vm::follow`] need not know the races.
+//! **Points that are left out.** A search at grain `variables` has points only for the variables that runs
+//! have shown to be in a race (see `races`), and begins again when they show another one. The choices of its
+//! findings have those at the points that were left out, too, so [`Vm::follow`] need not know the races.
 //!
 //! **Choices.** At each point any runnable task may continue, whatever its priority (every task has a turn at
 //! some time). The task that has just run comes first, then the others from the oldest to the newest; a
@@ -140,8 +140,8 @@ pub struct Settings {
     /// Whether tasks also stop before each use of a place that others may reach, in a program that was
     /// compiled with points.
     pub strict: bool,
-    /// Whether points are left out, at grain `variables`, whose absence no other task can see. The findings are the
-    /// same without, in more states.
+    /// Whether points are left out, at grain `variables`, whose absence no other task can see. The findings
+    /// are the same without, in more states.
     pub reduce: bool,
     /// Whether states also differ by the time, because the program reads the clock. Without this, times are
     /// relative to the time of the state. At grain `ticks`, states always differ by it.
@@ -322,6 +322,7 @@ pub fn explore_while<C, T: PartialEq + Clone, E>(
     let (mut races, mut goes_on) = (LearnedRaces::default(), goes_on);
     loop {
         let (search, known) = (RwLock::new(Search::default()), races.known.clone());
+        let settings = &races.settings(settings);
         let mut alone = SingleWorker::new(settings, &known, &search, &mut subject);
         if let Some(found) = search_by(settings, &search, &mut races, &mut alone, &mut goes_on)? {
             return Ok(found);
@@ -352,6 +353,7 @@ pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
     loop {
         let (search, stop) = (RwLock::new(Search::default()), AtomicBool::new(false));
         let known = races.known.clone();
+        let settings = &races.settings(settings);
         let (pool, works) = WorkerPool::new(jobs, (settings, &known), (&search, &stop), &subject);
         let (mut pool, mut found) = (Some(pool), None);
         side_by_side(works, &mut || {
@@ -374,6 +376,14 @@ struct LearnedRaces {
 }
 
 impl LearnedRaces {
+    /// Returns the settings of the next search. At a tick a task may hold a time that the library has read,
+    /// such as the deadline of a sleep; so where ticks are points because of what reaches tasks there, states
+    /// differ by the time.
+    fn settings(&self, settings: &Settings) -> Settings {
+        let is_at_ticks = settings.grain == Grain::Variables && (self.known.has_hits || !settings.reduce);
+        Settings { clock: settings.clock || is_at_ticks, ..*settings }
+    }
+
     /// Adds the notes of runs. Returns whether they show races that were not known.
     fn learn<'n>(&mut self, notes: impl Iterator<Item = &'n RaceNotes>) -> bool {
         notes.for_each(|notes| self.notes.add(notes));

@@ -216,8 +216,8 @@ impl PointRun {
 
     /// Runs from point to point, up to so many ticks of the whole run; at each, `choose` says which task
     /// continues. It is given the run as it stands, from which [`PointRun::go_on`] comes to the same choice
-    /// again. With races to watch, points are left out whose absence no other task can see. Returns how the run
-    /// has ended, unless it was given up.
+    /// again. With races to watch, points are left out whose absence no other task can see. Returns how the
+    /// run has ended, unless it was given up.
     pub(super) fn go_on(
         &mut self,
         vm: &mut Vm,
@@ -328,8 +328,11 @@ impl PointRun {
         let task = vm.scheduler.tasks.at(index).filter(|task| !task.flags.at_point())?;
         let depends_on_place = vm.scheduler.points.has_guards
             || task.control.get().is_some_and(|control| control.depends_on_place());
-        is_point |= depends_on_place || ticks >= way.most;
-        is_needed |= depends_on_place && has_hits || all_ticks >= MOST_LEFT_OUT;
+        is_point |= ticks >= way.most;
+        is_needed |= all_ticks >= MOST_LEFT_OUT && is_point;
+        // An abort cuts off the rest of the task, of which others may see each part.
+        is_point |= depends_on_place;
+        is_needed |= has_hits;
         if is_point && is_needed {
             return None;
         }

@@ -1,18 +1,20 @@
-//! Races: the variables that several tasks use, at least one of which sets them. Only uses of these need points.
+//! Races: the variables that several tasks use, at least one of which sets them. Only uses of these need
+//! points.
 //!
-//! A search begins with no variable in a race, and notes the uses of variables while other tasks exist. When its
-//! runs have shown a race that it did not know, it begins again, with points after the uses of that variable,
-//! too. It ends when its runs show no further race. Then every schedule of the machine behaves like one of its
-//! runs: a first use by which another schedule came to a further race would be a use in one of these runs, too.
+//! A search begins with no variable in a race, and notes the uses of variables while other tasks exist. When
+//! its runs have shown a race that it did not know, it begins again, with points after the uses of that
+//! variable, too. It ends when its runs show no further race. Then every schedule of the machine behaves like
+//! one of its runs: a first use by which another schedule came to a further race would be a use in one of
+//! these runs, too.
 //!
-//! In the same way it learns whether requests reach tasks that could run: to end, to leave a form, or interrupts.
-//! Then the place at which such a task stands makes a difference, and inside of cleanups and limits each tick of
-//! it is a point.
+//! In the same way it learns whether requests reach tasks that could run: to end, to leave a form, or
+//! interrupts. Then the place at which such a task stands makes a difference, and inside of cleanups and
+//! limits each tick of it is a point.
 //!
 //! Not here: the choices of a schedule, which count the points that were left out, too ([`super::search`]).
 //!
-//! Source: points learned from the races of runs as in dynamic partial-order reduction (Flanagan and Godefroid
-//! 2005). We differ in learning places instead of branches, which agrees with a set of states.
+//! Source: points learned from the races of runs as in dynamic partial-order reduction (Flanagan and
+//! Godefroid 2005). We differ in learning places instead of branches, which agrees with a set of states.
 
 use std::collections::{HashMap, HashSet};
 

@@ -145,7 +145,8 @@ impl Search {
         made.into_iter().flat_map(with_skipped).collect()
     }
 
-    /// Returns the choices that lead to a state on the way by which it was reached first, up to the state itself.
+    /// Returns the choices that lead to a state on the way by which it was reached first, up to the state
+    /// itself.
     pub(super) fn choices_to_state(&self, state: u32) -> Vec<u32> {
         let mut choices = self.choices(self.places[state as usize]);
         choices.extend(std::iter::repeat_n(0, self.tasks[state as usize].skipped as usize));

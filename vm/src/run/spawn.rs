@@ -156,6 +156,8 @@ pub(crate) fn make_task(
     heap.log_all_if_marking(&[function, arguments, notify, options.notify]);
     task.scanned = heap.cycle_id();
     scheduler.counts.made += 1;
+    // The new task may run before what its maker does next.
+    scheduler.points.note_shown();
     task.number = TaskNumber(scheduler.counts.made);
     task.serial = scheduler.serial.advance();
     task.priority = options.priority;

@@ -88,8 +88,8 @@ pub(crate) struct Points {
     pub(crate) has_clock: bool,
     /// Whether the running task may pass the point at which it stands.
     pub(crate) is_open: bool,
-    /// Whether the running task has passed a point, or has done something else that other tasks can see, since
-    /// the last tick.
+    /// Whether the running task has passed a point, or has done something else that other tasks can see,
+    /// since the last tick.
     pub(crate) has_shown: bool,
     /// Whether uses of special variables are noted.
     pub(crate) notes_variables: bool,

@@ -66,11 +66,12 @@ struct Suite<'a> {
 }
 
 impl Suite<'_> {
-    /// Runs a test once, and under all schedules if these are few.
+    /// Runs a test once, and under all schedules if these are few. Returns also whether the verdict is that
+    /// of the exploration.
     ///
     /// # Errors
     /// As [`run_test`].
-    fn run_and_explore(&self, test: &Test) -> Result<Verdict, Error> {
+    fn run_and_explore(&self, test: &Test) -> Result<(Verdict, bool), Error> {
         let of_file = || self.time.lock().unwrap_or_else(PoisonError::into_inner);
         let time = TIME_OF_TEST.min(*of_file());
         let mut left = time;
@@ -355,15 +356,15 @@ fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
     };
     let mut finished = FinishedTest { verdict: Verdict::Passed, seed: None, time: Duration::ZERO };
     for seed in seeds {
-        let verdict = match run.test.may_explore {
+        let found = match run.test.may_explore {
             true => run.suite.run_and_explore(&run.test),
-            false => run_test(&run.suite.program, &run.test, seed, &run.suite.setup),
+            false => run_test(&run.suite.program, &run.test, seed, &run.suite.setup)
+                .map(|verdict| (verdict, run.test.explores.is_some())),
         };
-        let verdict = verdict.unwrap_or_else(|error| Verdict::Failed {
-            why: "it cannot be begun".into(),
-            output: error.to_string(),
+        let (verdict, is_explored) = found.unwrap_or_else(|error| {
+            (Verdict::Failed { why: "it cannot be begun".into(), output: error.to_string() }, false)
         });
-        let seed = run.test.explores.is_none().then_some(seed);
+        let seed = (!is_explored).then_some(seed);
         match verdict {
             Verdict::Passed => {}
             Verdict::PassedAll(_) => finished = FinishedTest { verdict, ..finished },

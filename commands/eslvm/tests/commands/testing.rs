@@ -77,7 +77,7 @@ fn failures_are_shown_with_what_repeats_them() {
         "  FAILED  WAITING, seed 0: it waits for an event that cannot occur\n          Deadlock:",
         "  FAILED  LEAVING, seed 0: it has ended the run with the status 7\n",
         "  FAILED  RACING: under a schedule, a check did not hold (grain variables, timers idle; ",
-        "  passed  LEFT-BEHIND\n",
+        "  passed  LEFT-BEHIND, explored: complete, ",
         "  FAILED  ENDLESS, seed 0: its budget of ticks is spent",
         "\n3 passed, 9 failed\n",
     ] {
@@ -182,6 +182,57 @@ fn two_tests_of_one_name_are_an_error() {
     assert_eq!((status, &*output), (Some(3), ""), "{errors}");
     let said = "twice.esl has two tests `MOVING`, at twice.esl:2:3 and at twice.esl:5:3: rename one";
     assert!(errors.contains(said), "{errors}");
+}
+
+#[test]
+fn small_tests_of_several_tasks_are_explored_unasked() {
+    let text = "(defvar *n* 0)
+        (defun one-more (n) (+ n 1))
+        (defun update () (setq *n* (one-more *n*)))
+        (deftest alone (update) (is (= *n* 1)))
+        (deftest lucky (task-net (a (update)) (b (update))) (is (= *n* 2)))
+        (deftest careful
+          (task-net (a (without-interrupts (update))) (b (without-interrupts (update))))
+          (is (= *n* 2)))
+        (deftest left-out :explore nil (task-net (a (update)) (b (update))) (is (= *n* 2)))";
+    let folder = Folder::with("testing-unasked", &[("tests.esl", text)]);
+    let (status, output) = test(&folder, &["tests.esl"]);
+    assert_eq!(status, Some(1), "{output}");
+    for line in [
+        "  passed  ALONE\n  FAILED  LUCKY: under a schedule, a check did not hold (grain variables, ",
+        "again: eslvm test tests.esl --filter LUCKY\n",
+        "  passed  CAREFUL, explored: complete, ",
+        "  passed  LEFT-OUT\n",
+        "3 passed, 1 failed\n",
+    ] {
+        assert!(output.contains(line), "{line}: {output}");
+    }
+    let (status, output) = test(&folder, &["--no-explore", "tests.esl"]);
+    assert_eq!(status, Some(0), "{output}");
+    assert!(output.contains("  passed  LUCKY\n  passed  CAREFUL\n"), "{output}");
+}
+
+#[test]
+fn a_test_that_is_explored_strictly_fails_by_a_fragile_update() {
+    let text = "(defvar *n* 0)
+        (defun update () (setq *n* (+ *n* 1)))
+        (deftest plain :explore t (task-net (a (update)) (b (update))) (is (= *n* 2)))
+        (deftest strict :explore (:strict t) (task-net (a (update)) (b (update))) (is (= *n* 2)))
+        (deftest sure
+          :explore (:strict t)
+          (task-net (a (without-interrupts (update))) (b (without-interrupts (update))))
+          (is (= *n* 2)))";
+    let folder = Folder::with("testing-strict", &[("tests.esl", text)]);
+    let (status, output) = test(&folder, &["tests.esl"]);
+    assert_eq!(status, Some(1), "{output}");
+    for line in [
+        "  passed  PLAIN, all schedules, grain variables, ",
+        "  FAILED  STRICT: with switches before each use of a shared place, under a schedule, a check did not hold",
+        "  passed  SURE, all schedules, grain variables, ",
+        "; not fragile: all schedules, grain variables, ",
+    ] {
+        assert!(output.contains(line), "{line}: {output}");
+    }
 }
 
 #[test]

@@ -106,6 +106,7 @@ const SEEN: &[SharedKind] = &[
         actions: &[
             "(setq *helper* (spawn (setq *helped* (one-more *helped*))))",
             "(when *helper* (abort-task *helper*))",
+            "(progn (spawn (push 'child# *seen-#*)) (one-more 0) (setq *helped* (one-more *helped*)))",
             "(when *helper* (push (task-status *helper*) *seen-#*))",
             "(unwind-protect (one-more 1) (setq *helped* #))",
             "(push *helped* *seen-#*)",
@@ -366,7 +367,7 @@ impl GeneratedProgram {
         )
     }
 
-    /// Takes the last action of the longest task away. Returns whether there was one to be taken.
+    /// Takes the last action of the longest task away. Returns whether one was taken.
     pub(super) fn shorten(&mut self) -> bool {
         let Some(longest) = self.tasks.iter_mut().rev().max_by_key(|actions| actions.len()) else {
             return false;

@@ -269,3 +269,25 @@ fn a_livelock_goes_round_as_often_as_one_likes() {
         assert!(found.has_cycle && found.livelock.is_none() && found.endless.is_none(), "{text}: {found:?}");
     }
 }
+
+#[test]
+fn a_condition_that_holds_in_no_state_of_a_schedule_is_found() {
+    // It holds in between, and not at the end.
+    let act = "(setq *on* t) (sleep 0) (setq *on* nil)";
+    let text = |act: &str| {
+        format!(
+            "(defvar *on* nil)
+             (eventually switched-on *on*)
+             (task-net (one {act}) (two (sleep 0)))"
+        )
+    };
+    let ended = |found: &Exploration<Behaviour>| -> Vec<Ended> {
+        found.endings.iter().map(|ending| ending.what.ended).collect()
+    };
+    let found = endings(&text(act), Grain::Variables);
+    assert_eq!(ended(&found), [Ended::Normally(0)], "{found:?}");
+    let found = endings(&text(&format!("(when (choose t nil) {act})")), Grain::Variables);
+    assert_eq!(ended(&found), [Ended::Normally(0), Ended::Normally(1)], "{found:?}");
+    let expected = "SWITCHED-ON, which has to hold eventually, never did.";
+    assert!(found.endings[1].what.errors.contains(expected), "{found:?}");
+}

@@ -1,12 +1,12 @@
-//! Generated programs end at the default grain, with points left out, as they do with switches at all ticks and
-//! nothing left out. A reduction of the exploration that loses an ending fails here.
+//! Generated programs end at the default grain, with points left out, as they do with switches at all ticks
+//! and nothing left out. A reduction of the exploration that loses an ending fails here.
 //!
-//! Where the default grain of a program is `ticks`, both are one search: then runs of the machine's own scheduler
-//! are compared with it, as they are for all programs. A program with too many states loses an action until it
-//! has few enough.
+//! Where the default grain of a program is `ticks`, both are one search: then runs of the machine's own
+//! scheduler are compared with it, as they are for all programs. A program with too many states loses an
+//! action until it has few enough.
 //!
-//! `ESL_ORACLE=10000` tries so many programs, from the number `ESL_ORACLE_FROM` on, in `ESL_ORACLE_JOBS` threads;
-//! by default there are few.
+//! `ESL_ORACLE=10000` tries so many programs, from the number `ESL_ORACLE_FROM` on, in `ESL_ORACLE_JOBS`
+//! threads; by default there are few.
 
 use std::collections::BTreeSet;
 use std::sync::Mutex;
