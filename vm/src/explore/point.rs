@@ -11,7 +11,7 @@ use crate::heap::Kind;
 use crate::heap::layout::SymbolObject;
 use crate::run::{self, RunOutcome};
 use crate::schedule::{Choices, Due, Grain};
-use crate::task::{TaskIndex, TaskNumber, TaskState};
+use crate::task::{Control, EntryKind, TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -326,8 +326,8 @@ impl PointRun {
         }
         let (_, index) = runnable_tasks(vm).find(|&(number, _)| number == self.last)?;
         let task = vm.scheduler.tasks.at(index).filter(|task| !task.flags.at_point())?;
-        let depends_on_place = vm.scheduler.points.has_guards
-            || task.control.get().is_some_and(|control| control.depends_on_place());
+        let depends_on_place =
+            vm.scheduler.points.has_guards || task.control.get().is_some_and(depends_on_place);
         is_point |= ticks >= way.most;
         is_needed |= all_ticks >= MOST_LEFT_OUT && is_point;
         // An abort cuts off the rest of the task, of which others may see each part.
@@ -380,6 +380,15 @@ fn watch_variables(vm: &mut Vm) {
 
 /// Flags of symbols that have no variable, or one whose uses are known already.
 const NOT_WATCHED: u8 = SymbolObject::CONSTANT | SymbolObject::EVER_BOUND;
+
+/// Returns whether it makes a difference at which place a task is asked to end, or to leave a form: a cleanup runs
+/// then, or the form is followed by others, which may use variables of the task.
+fn depends_on_place(control: &Control) -> bool {
+    let depends = |kind| {
+        matches!(kind, EntryKind::Cleanup | EntryKind::Running | EntryKind::Limit | EntryKind::Interrupt)
+    };
+    control.entries.iter().any(|entry| depends(entry.kind))
+}
 
 /// Returns whether time may pass while tasks can run. A cleanup takes no longer than it may: otherwise each
 /// that waits would be found to be cut off somewhere.

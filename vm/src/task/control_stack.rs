@@ -295,16 +295,6 @@ impl Control {
         self.entries.push(Entry { kind: EntryKind::Running, data, ..entry });
     }
 
-    /// Returns whether it makes a difference at which place the task is asked to end, or to leave a form: a
-    /// cleanup runs then, or the form is followed by others, which may use variables of the task.
-    pub(crate) fn depends_on_place(&self) -> bool {
-        let depends = |kind| {
-            use EntryKind::{Cleanup, Interrupt, Limit, Running};
-            matches!(kind, Cleanup | Running | Limit | Interrupt)
-        };
-        self.entries.iter().any(|entry| depends(entry.kind))
-    }
-
     /// Returns the index of the entry of the innermost running cleanup.
     pub(crate) fn innermost_cleanup(&self) -> Option<usize> {
         Some(self.running.last()?.entry)
