@@ -214,62 +214,69 @@ pub fn run_test(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Res
     run_once(program, test, seed, setup).map(|(verdict, _)| verdict)
 }
 
-/// Runs a test once. Returns what became of it, and whether it has made tasks.
-fn run_once(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Result<(Verdict, bool), Error> {
+/// The size of a run of a test.
+struct RunSize {
+    ticks: u64,
+    makes_tasks: bool,
+}
+
+/// Runs a test once. Returns what became of it, and the size of the run.
+fn run_once(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Result<(Verdict, RunSize), Error> {
     let written = Written::default();
     let (mut machine, main) = begin(program, test, seed, setup, Box::new(written.host(setup)))?;
     let (made_before, ..) = machine.tasks_turns_and_switches();
+    let ticks_before = machine.ticks();
     let outcome = machine.run(u64::MAX);
     let ended = program::end(&mut machine, main, outcome);
     let (made, ..) = machine.tasks_turns_and_switches();
+    let size = RunSize { ticks: machine.ticks() - ticks_before, makes_tasks: made > made_before };
     program::end_rest(&mut machine);
     setup.note_passages(&mut machine);
-    Ok((verdict(ended, || written.text()), made > made_before))
+    Ok((verdict(ended, || written.text()), size))
 }
 
 /// Most states of a test that is explored unasked.
 const FEW_STATES: usize = 2_000;
 
+/// Most ticks of its runs, if each state costs as many as a run has.
+const FEW_TICKS: u64 = 5_000_000;
+
+/// Time after which such an exploration is given up: more than the two numbers above let any test take that is
+/// like others, so that the line of a test does not depend on what else its machine does.
+const LONG: Duration = Duration::from_secs(20);
+
 /// Bytes that such an exploration may take.
 const LITTLE_MEMORY: usize = 1 << 27;
 
-/// Runs a test once, and then under all schedules, if it has made tasks, its schedules are few, and they are
-/// tried in so much time, from which the time of the exploration is taken. Returns also whether the verdict
-/// is that of the exploration.
+/// Runs a test once, and then under all schedules, if it has made tasks and its schedules are few. Returns also
+/// whether the verdict is that of the exploration.
 ///
 /// # Errors
 /// As [`run_test`].
-pub fn run_and_explore(
-    program: &Program,
-    test: &Test,
-    setup: &Setup,
-    time: &mut Duration,
-) -> Result<(Verdict, bool), Error> {
-    let (verdict, has_tasks) = run_once(program, test, 0, setup)?;
-    if verdict != Verdict::Passed || !test.may_explore || !has_tasks || time.is_zero() {
+pub fn run_and_explore(program: &Program, test: &Test, setup: &Setup) -> Result<(Verdict, bool), Error> {
+    let (verdict, RunSize { ticks, makes_tasks }) = run_once(program, test, 0, setup)?;
+    if verdict != Verdict::Passed || !test.may_explore || !makes_tasks {
         return Ok((verdict, false));
     }
-    let started = Instant::now();
-    let found = explore_if_small(program, test, setup, *time);
-    *time = time.saturating_sub(started.elapsed());
-    Ok(found?.map_or((verdict, false), |found| (found, true)))
+    let states = usize::try_from(FEW_TICKS / ticks.max(1)).unwrap_or(FEW_STATES).min(FEW_STATES);
+    let found = explore_if_small(program, test, setup, states)?;
+    Ok(found.map_or((verdict, false), |found| (found, true)))
 }
 
-/// Explores a test. Returns `None` if it has too many schedules, or needs an outside that explorations do not
-/// have.
+/// Explores a test. Returns `None` if it has more than so many states, or needs an outside that explorations do
+/// not have.
 fn explore_if_small(
     program: &Program,
     test: &Test,
     setup: &Setup,
-    time: Duration,
+    states: usize,
 ) -> Result<Option<Verdict>, Error> {
     let started = Instant::now();
     let mut complete = None;
     for grain in grains(program, None) {
-        let few =
-            Settings { states: FEW_STATES, memory: LITTLE_MEMORY, output: false, ..Settings::default() };
+        let few = Settings { states, memory: LITTLE_MEMORY, output: false, ..Settings::default() };
         let settings = Settings { grain, ..few };
-        let found = explore_at(program, test, &settings, setup, &mut || started.elapsed() < time)?;
+        let found = explore_at(program, test, &settings, setup, &mut || started.elapsed() < LONG)?;
         // The first schedule is about the one that has passed with the outside of the test.
         let first = found.endings.first().map(|ending| &ending.what);
         if first.is_some_and(|verdict| *verdict != Verdict::Passed) {

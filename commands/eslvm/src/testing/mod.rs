@@ -50,10 +50,6 @@ pub struct Options {
     pub explores: bool,
 }
 
-/// Most time for which the tests of a file are explored unasked, and that for which one of them is.
-const TIME_OF_FILE: Duration = Duration::from_secs(2);
-const TIME_OF_TEST: Duration = Duration::from_millis(500);
-
 /// A file with tests.
 struct Suite<'a> {
     file: &'a Path,
@@ -61,26 +57,11 @@ struct Suite<'a> {
     setup: Setup,
     /// The source, unless the file is compiled.
     source: Option<Source>,
-    /// Time that is left for explorations that were not asked for.
-    time: Mutex<Duration>,
+    /// Whether tests are explored unasked.
+    explores: bool,
 }
 
 impl Suite<'_> {
-    /// Runs a test once, and under all schedules if these are few. Returns also whether the verdict is that
-    /// of the exploration.
-    ///
-    /// # Errors
-    /// As [`run_test`].
-    fn run_and_explore(&self, test: &Test) -> Result<(Verdict, bool), Error> {
-        let of_file = || self.time.lock().unwrap_or_else(PoisonError::into_inner);
-        let time = TIME_OF_TEST.min(*of_file());
-        let mut left = time;
-        let verdict = run_and_explore(&self.program, test, &self.setup, &mut left);
-        let mut of_file = of_file();
-        *of_file = of_file.saturating_sub(time - left);
-        verdict
-    }
-
     /// Compiles the program with points, for tests that are explored strictly.
     fn add_points(&mut self) {
         let Some(source) = &self.source else { return };
@@ -332,8 +313,7 @@ fn suite<'a>(file: &'a Path, library: &[PathBuf], options: &Options) -> Result<S
     let (config, rights) = (options.config.clone(), options.rights.clone());
     let setup = Setup { config, path, rights, coverage, is_full: options.is_full, with_points: None };
     let explores = options.explores && options.seed.is_none() && options.coverage.is_none();
-    let time = Mutex::new(if explores { TIME_OF_FILE } else { Duration::ZERO });
-    Ok(Suite { file, program, setup, source, time })
+    Ok(Suite { file, program, setup, source, explores })
 }
 
 fn is_wanted(test: &Test, filter: Option<&str>) -> bool {
@@ -356,8 +336,8 @@ fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
     };
     let mut finished = FinishedTest { verdict: Verdict::Passed, seed: None, time: Duration::ZERO };
     for seed in seeds {
-        let found = match run.test.may_explore {
-            true => run.suite.run_and_explore(&run.test),
+        let found = match run.test.may_explore && run.suite.explores {
+            true => run_and_explore(&run.suite.program, &run.test, &run.suite.setup),
             false => run_test(&run.suite.program, &run.test, seed, &run.suite.setup)
                 .map(|verdict| (verdict, run.test.explores.is_some())),
         };
