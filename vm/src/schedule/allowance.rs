@@ -26,8 +26,8 @@ impl Scheduler {
         host: &mut dyn Host,
         config: &Config,
     ) -> Option<Allowance> {
-        let fund = self.task().extra.as_ref().and_then(|extra| extra.fund);
-        let is_new = fund.is_none_or(|fund| depth.is_some_and(|depth| depth < fund.depth));
+        let fund = self.task().extra.as_ref().and_then(|extra| extra.fund.as_ref());
+        let is_new = fund.is_none_or(|fund| fund.is_inside(depth));
         if !is_new && fund.is_some_and(|fund| fund.refuses(index)) {
             // There may be very many of these, and to look at the clock takes longer than to leave one.
             return None;
