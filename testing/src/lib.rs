@@ -241,15 +241,15 @@ const FEW_STATES: usize = 2_000;
 /// Most ticks of its runs, if each state costs as many as a run has.
 const FEW_TICKS: u64 = 5_000_000;
 
-/// Time after which such an exploration is given up: more than the two numbers above let any test take that is
-/// like others, so that the line of a test does not depend on what else its machine does.
+/// Time after which such an exploration is given up: more than the two numbers above let any usual test take,
+/// so that the line of a test does not depend on what else its machine does.
 const LONG: Duration = Duration::from_secs(20);
 
 /// Bytes that such an exploration may take.
 const LITTLE_MEMORY: usize = 1 << 27;
 
-/// Runs a test once, and then under all schedules, if it has made tasks and its schedules are few. Returns also
-/// whether the verdict is that of the exploration.
+/// Runs a test once, and then under all schedules, if it has made tasks and its schedules are few. Returns
+/// also whether the verdict is that of the exploration.
 ///
 /// # Errors
 /// As [`run_test`].
@@ -263,8 +263,8 @@ pub fn run_and_explore(program: &Program, test: &Test, setup: &Setup) -> Result<
     Ok(found.map_or((verdict, false), |found| (found, true)))
 }
 
-/// Explores a test. Returns `None` if it has more than so many states, or needs an outside that explorations do
-/// not have.
+/// Explores a test. Returns `None` if it has more than so many states, or needs an outside that explorations
+/// do not have.
 fn explore_if_small(
     program: &Program,
     test: &Test,

@@ -36,8 +36,8 @@ const OF_THE_LIBRARY: &[fn(&Inbox) -> HostRows] = &[
 /// The modules of other crates.
 static ADDED: RwLock<Vec<&'static HostModule>> = RwLock::new(Vec::new());
 
-/// Modules of crates that a program may lack, and the feature of the commands that adds them. Those that begin
-/// with such a name and a hyphen are parts of them.
+/// Modules of crates that a program may lack, and the feature of the commands that adds them. Those that
+/// begin with such a name and a hyphen are parts of them.
 const OPTIONAL: &[(&str, &str)] =
     &[("mavlink", "robots"), ("mcap", "robots"), ("ros", "robots"), ("zenoh", "robots")];
 

@@ -381,8 +381,8 @@ fn watch_variables(vm: &mut Vm) {
 /// Flags of symbols that have no variable, or one whose uses are known already.
 const NOT_WATCHED: u8 = SymbolObject::CONSTANT | SymbolObject::EVER_BOUND;
 
-/// Returns whether it makes a difference at which place a task is asked to end, or to leave a form: a cleanup runs
-/// then, or the form is followed by others, which may use variables of the task.
+/// Returns whether it makes a difference at which place a task is asked to end, or to leave a form: a cleanup
+/// runs then, or the form is followed by others, which may use variables of the task.
 fn depends_on_place(control: &Control) -> bool {
     let depends = |kind| {
         matches!(kind, EntryKind::Cleanup | EntryKind::Running | EntryKind::Limit | EntryKind::Interrupt)

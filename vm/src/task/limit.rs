@@ -128,8 +128,8 @@ impl Fund {
             || now.time.saturating_add(LAST_TICKS * LAST_TIME_PER_TICK) > self.ends.time
     }
 
-    /// Returns whether an abort or a limit that leaves so many entries ends outside of where this one ends. Not
-    /// inlined: the compiler would compare the depth of a fund that does not exist, and valgrind reports that.
+    /// Returns whether an abort or a limit that leaves so many entries ends outside of where this one does.
+    /// Not inlined: the depth of a fund that does not exist would be compared, and valgrind reports that.
     #[inline(never)]
     pub(crate) fn is_inside(&self, depth: Option<usize>) -> bool {
         depth.is_some_and(|depth| depth < self.depth)

@@ -110,8 +110,8 @@ fn check(path: &str, markdown: &str) -> Result<(), String> {
     if program.contains("(deftest ") {
         let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.esl", path.replace('/', "-")));
         std::fs::write(&file, &program).map_err(|error| error.to_string())?;
-        // The programs of a chapter are one file here: the exploration of a test would find what another program
-        // is to show, as that two valves are open.
+        // The programs of a chapter are one file here: the exploration of a test would find what another
+        // program is to show, as that two valves are open.
         let told = eslvm(&["test", "--no-explore", &file.to_string_lossy()], "")?;
         if !told.trim_end().ends_with(" 0 failed") {
             return Err(told);
