@@ -79,10 +79,12 @@ impl Watcher {
     }
 }
 
-/// The names of watches that are over, each with the end of its task to come. A name is free when that has
-/// come.
+/// The name of a watch that is over, with the end of its task to come.
+type LeftWatch = (String, Reply<Data>);
+
+/// The names of watches that are over. One is free when the end of its task has come.
 #[derive(Clone, Default)]
-pub(super) struct LeftWatches(Arc<Mutex<Vec<(String, Reply<Data>)>>>);
+pub(super) struct LeftWatches(Arc<Mutex<Vec<LeftWatch>>>);
 
 impl LeftWatches {
     fn add(&self, name: String, end: Reply<Data>) {

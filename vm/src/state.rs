@@ -227,8 +227,6 @@ list_state! { Points {
     has_clock: Process,
     is_open: Run,
     has_shown: Run,
-    notes_variables: Process,
-    variables: Process,
     was_hit: Process,
     has_guards: Process,
     asked: Run,

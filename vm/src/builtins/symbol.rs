@@ -128,7 +128,7 @@ pub(super) fn remprop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn symbol_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let object = symbol_object(vm, arguments[0])?;
-    vm.note_read(object);
+    vm.scheduler.points.note_shown();
     match vm.symbol_value(object) {
         Some(value) => {
             if vm.scheduler.points.uses.is_some() {
@@ -149,7 +149,7 @@ pub(super) fn set(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn boundp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let object = symbol_object(vm, arguments[0])?;
-    vm.note_read(object);
+    vm.scheduler.points.note_shown();
     Ok(Value::boolean(vm.symbol_value(object).is_some()))
 }
 

@@ -11,7 +11,6 @@
 //! worker        this thread, or several, among which the runs are divided
 //! keep          returning to places of that tree
 //! livelock      ways round that are fair to all
-//! races         the variables whose uses need points
 //! random        runs by random priorities
 //! ```
 //!
@@ -28,9 +27,10 @@
 //! calls a search complete has to know that the program has none. Where a program itself chooses, by
 //! `choose`, each way is tried. A task that reaches no point is stopped after [`Settings::turn`] ticks.
 //!
-//! **Points that are left out.** A search at grain `variables` has points only for the variables that runs
-//! have shown to be in a race (see `races`), and begins again when they show another one. The choices of its
-//! findings have those at the points that were left out, too, so [`Vm::follow`] need not know the races.
+//! **Points that are left out.** The ticks inside of cleanup forms and limits matter only where a request
+//! reaches a task that could run: to end, to leave a form, or an interrupt. So a search at grain `variables`
+//! begins without these points, and begins again with them when a run has shown such a request. The choices
+//! of its findings have those at the points that were left out, too, so [`Vm::follow`] need not know them.
 //!
 //! **Choices.** At each point any runnable task may continue, whatever its priority (every task has a turn at
 //! some time). The task that has just run comes first, then the others from the oldest to the newest; a
@@ -63,7 +63,6 @@ mod live;
 mod livelock;
 mod numbers;
 mod point;
-mod races;
 mod random;
 mod search;
 mod step;
@@ -79,7 +78,6 @@ use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
 pub use point::FollowedRun;
-use races::{RaceNotes, Races};
 pub use random::{RandomRun, RandomSchedule};
 use search::Search;
 pub use step::{ScheduleEvent, ScheduleStep, StandingTask, Switch, TellStep};
@@ -140,8 +138,8 @@ pub struct Settings {
     /// Whether tasks also stop before each use of a place that others may reach, in a program that was
     /// compiled with points.
     pub strict: bool,
-    /// Whether points are left out, at grain `variables`, whose absence no other task can see. The findings
-    /// are the same without, in more states.
+    /// Whether points are left out, at grain `variables`, that are needed only where requests reach tasks that
+    /// could run, until a run has shown one. The findings are the same without, in more states.
     pub reduce: bool,
     /// Whether states also differ by the time, because the program reads the clock. Without this, times are
     /// relative to the time of the state. At grain `ticks`, states always differ by it.
@@ -164,6 +162,20 @@ impl Default for Settings {
             reduce: true,
             clock: false,
         }
+    }
+}
+
+impl Settings {
+    /// Returns the settings of the first search.
+    fn at_first(&self) -> Settings {
+        if self.reduce { *self } else { self.with_all_points() }
+    }
+
+    /// Returns the settings of a search that leaves no points out. At a tick a task may hold a time that the
+    /// library has read, such as the deadline of a sleep; so where ticks are points, states differ by the time.
+    fn with_all_points(&self) -> Settings {
+        let clock = self.clock || self.grain == Grain::Variables;
+        Settings { reduce: false, clock, ..*self }
     }
 }
 
@@ -319,15 +331,15 @@ pub fn explore_while<C, T: PartialEq + Clone, E>(
     goes_on: impl FnMut(&SearchProgress) -> bool,
 ) -> Result<Exploration<T>, E> {
     let mut subject = TwoFunctions { present: None, begin, judge };
-    let (mut races, mut goes_on) = (LearnedRaces::default(), goes_on);
-    loop {
-        let (search, known) = (RwLock::new(Search::default()), races.known.clone());
-        let settings = &races.settings(settings);
-        let mut alone = SingleWorker::new(settings, &known, &search, &mut subject);
-        if let Some(found) = search_by(settings, &search, &mut races, &mut alone, &mut goes_on)? {
+    let mut goes_on = goes_on;
+    for settings in [settings.at_first(), settings.with_all_points()] {
+        let search = RwLock::new(Search::default());
+        let mut alone = SingleWorker::new(&settings, &search, &mut subject);
+        if let Some(found) = search_by(&settings, &search, &mut alone, &mut goes_on)? {
             return Ok(found);
         }
     }
+    unreachable!("a search with all points is not left for one with more")
 }
 
 /// Calls functions in threads of their own and the last one in this thread, and waits for all of them.
@@ -349,59 +361,30 @@ pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
         return explore_while(settings, begin, judge, goes_on);
     }
     let subject = || TwoFunctions { present: None, begin: &begin, judge: &judge };
-    let mut races = LearnedRaces::default();
-    loop {
+    for settings in [settings.at_first(), settings.with_all_points()] {
         let (search, stop) = (RwLock::new(Search::default()), AtomicBool::new(false));
-        let known = races.known.clone();
-        let settings = &races.settings(settings);
-        let (pool, works) = WorkerPool::new(jobs, (settings, &known), (&search, &stop), &subject);
+        let (pool, works) = WorkerPool::new(jobs, &settings, (&search, &stop), &subject);
         let (mut pool, mut found) = (Some(pool), None);
         side_by_side(works, &mut || {
             // The threads end when the pool is dropped.
             if let Some(mut pool) = pool.take() {
-                found = Some(search_by(settings, &search, &mut races, &mut pool, &mut goes_on));
+                found = Some(search_by(&settings, &search, &mut pool, &mut goes_on));
             }
         });
         if let Some(found) = found.expect("the last function was called")? {
             return Ok(found);
         }
     }
-}
-
-/// The races that searches know, and the uses of variables that they have shown.
-#[derive(Default)]
-struct LearnedRaces {
-    known: Races,
-    notes: RaceNotes,
-}
-
-impl LearnedRaces {
-    /// Returns the settings of the next search. At a tick a task may hold a time that the library has read,
-    /// such as the deadline of a sleep; so where ticks are points because of what reaches tasks there, states
-    /// differ by the time.
-    fn settings(&self, settings: &Settings) -> Settings {
-        let is_at_ticks = settings.grain == Grain::Variables && (self.known.has_hits || !settings.reduce);
-        Settings { clock: settings.clock || is_at_ticks, ..*settings }
-    }
-
-    /// Adds the notes of runs. Returns whether they show races that were not known.
-    fn learn<'n>(&mut self, notes: impl Iterator<Item = &'n RaceNotes>) -> bool {
-        notes.for_each(|notes| self.notes.add(notes));
-        let more = self.notes.beyond(&self.known);
-        let has_more = more.is_some();
-        self.known = more.unwrap_or(std::mem::take(&mut self.known));
-        has_more
-    }
+    unreachable!("a search with all points is not left for one with more")
 }
 
 /// Runs of a batch: few enough that the shortest schedules come first, and enough for all threads.
 const BATCH: usize = 64;
 
-/// Searches with the help of workers. Returns `None` if runs have shown races that the workers do not know.
+/// Searches with the help of workers. Returns `None` if points are left out that runs have shown to be needed.
 fn search_by<T: PartialEq + Clone, E>(
     settings: &Settings,
     search: &RwLock<Search>,
-    races: &mut LearnedRaces,
     workers: &mut dyn Workers<T, E>,
     goes_on: &mut dyn FnMut(&SearchProgress) -> bool,
 ) -> Result<Option<Exploration<T>>, E> {
@@ -421,7 +404,7 @@ fn search_by<T: PartialEq + Clone, E>(
         let mut traces = workers.run(places.clone(), &mut |more| {
             goes_on(&SearchProgress { states: progress.states + more, ..progress })
         })?;
-        if races.learn(traces.iter().map(|trace| &trace.notes)) {
+        if settings.reduce && traces.iter().any(|trace| trace.was_requested) {
             return Ok(None);
         }
         let search = &mut *write();

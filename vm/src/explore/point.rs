@@ -2,7 +2,6 @@
 
 use smallvec::SmallVec;
 
-use super::races::RaceWatch;
 use super::step::{
     Runnable, ScheduleEvent, ScheduleStep, TellStep, is_of_library, switch, tell_step, tell_uses,
 };
@@ -54,8 +53,6 @@ impl Vm {
     pub fn end_following(&mut self) {
         self.scheduler.points.grain = None;
         self.scheduler.points.is_strict = false;
-        self.scheduler.points.notes_variables = false;
-        self.scheduler.points.variables = Vec::new();
     }
 
     /// Runs the program from point to point along a list of choices found by [`super::explore`] with the same
@@ -133,7 +130,6 @@ fn follow(
 pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.scheduler.points.grain = Some(settings.grain);
     vm.scheduler.points.is_strict = settings.strict;
-    vm.scheduler.points.notes_variables = settings.grain == Grain::Variables;
     // At a tick a task may hold a time that the library has read, such as the deadline of a sleep; relative
     // times do not tell whether that has passed.
     vm.scheduler.points.has_clock = settings.clock || settings.grain == Grain::Ticks;
@@ -169,16 +165,9 @@ struct UnseenWay {
     watched: usize,
     /// Ticks since then, or since a point that was left out.
     ticks: u32,
-    /// Ticks since then, if points are left out.
-    all_ticks: u32,
     /// Ticks after which there is a point in any case.
     most: u32,
-    /// Number of tasks at the last tick.
-    alive: usize,
 }
-
-/// Ticks after which a point is no longer left out: a loop that waits for other tasks comes to one soon.
-const MOST_LEFT_OUT: u32 = 1_000;
 
 /// Says which of the tasks continues at a point, or `None` to give up the run.
 pub(super) type Choose<'a> = dyn FnMut(&mut Vm, PointRun, Runnable<'_>) -> Option<u32> + 'a;
@@ -195,9 +184,7 @@ impl PointRun {
             unseen: (settings.grain == Grain::Variables).then_some(UnseenWay {
                 watched: 0,
                 ticks: 0,
-                all_ticks: 0,
                 most: settings.turn,
-                alive: 0,
             }),
             skipped: 0,
         }
@@ -216,13 +203,13 @@ impl PointRun {
 
     /// Runs from point to point, up to so many ticks of the whole run; at each, `choose` says which task
     /// continues. It is given the run as it stands, from which [`PointRun::go_on`] comes to the same choice
-    /// again. With races to watch, points are left out whose absence no other task can see. Returns how the
-    /// run has ended, unless it was given up.
+    /// again. With a flag, points are left out that are needed only where requests reach tasks that could
+    /// run; it is set if one does. Returns how the run has ended, unless it was given up.
     pub(super) fn go_on(
         &mut self,
         vm: &mut Vm,
         end: u64,
-        mut races: Option<&mut RaceWatch<'_>>,
+        mut requested: Option<&mut bool>,
         choose: &mut Choose<'_>,
     ) -> Option<RunOutcome> {
         loop {
@@ -237,7 +224,7 @@ impl PointRun {
                 if let Some(outcome) = self.come_to_point(vm) {
                     return Some(outcome);
                 }
-                if let Some(index) = self.goes_on_unseen(vm, races.as_deref_mut()) {
+                if let Some(index) = self.goes_on_unseen(vm, requested.as_deref_mut()) {
                     run::give_turn(vm, index, end);
                     continue;
                 }
@@ -291,7 +278,7 @@ impl PointRun {
 
     /// Returns the task that ran last if it stands at a tick that is not a point: if others have seen nothing
     /// of it since its last point, giving way here would be as giving way there.
-    fn goes_on_unseen(&mut self, vm: &mut Vm, mut races: Option<&mut RaceWatch<'_>>) -> Option<TaskIndex> {
+    fn goes_on_unseen(&mut self, vm: &mut Vm, requested: Option<&mut bool>) -> Option<TaskIndex> {
         let way = self.unseen.as_mut()?;
         let symbols = vm.names.symbol_count();
         if way.watched != symbols {
@@ -301,46 +288,26 @@ impl PointRun {
         let points = &mut vm.scheduler.points;
         let (has_shown, was_hit) =
             (std::mem::take(&mut points.has_shown), std::mem::take(&mut points.was_hit));
-        let variables = std::mem::take(&mut points.variables);
-        let before = std::mem::replace(&mut way.alive, vm.scheduler.counts.alive);
-        let has_others = before.max(way.alive) > 1;
-        // Whether there is a point here, and whether it cannot be left out.
-        let (mut is_point, mut is_needed) = (has_shown, has_shown || races.is_none());
-        for used in variables {
-            let is_seen = races.as_deref_mut().is_none_or(|races| races.see(vm, used, has_others));
-            if used.task == self.last {
-                is_point = true;
-                is_needed |= is_seen;
-            }
+        let leaves_out = requested.is_some();
+        if let Some(requested) = requested {
+            *requested |= was_hit;
         }
-        let has_hits = races.is_some_and(|races| {
-            if was_hit {
-                races.note_hit();
-            }
-            races.known.has_hits
-        });
         let ticks = std::mem::take(&mut way.ticks) + 1;
-        let all_ticks = std::mem::take(&mut way.all_ticks) + 1;
-        if vm.scheduler.points.asked.is_some() {
+        if has_shown || ticks >= way.most || vm.scheduler.points.asked.is_some() {
             return None;
         }
         let (_, index) = runnable_tasks(vm).find(|&(number, _)| number == self.last)?;
         let task = vm.scheduler.tasks.at(index).filter(|task| !task.flags.at_point())?;
-        let depends_on_place =
-            vm.scheduler.points.has_guards || task.control.get().is_some_and(depends_on_place);
-        is_point |= ticks >= way.most;
-        is_needed |= all_ticks >= MOST_LEFT_OUT && is_point;
         // An abort cuts off the rest of the task, of which others may see each part.
-        is_point |= depends_on_place;
-        is_needed |= has_hits;
-        if is_point && is_needed {
-            return None;
-        }
-        way.all_ticks = all_ticks;
-        if !is_point {
+        if vm.scheduler.points.has_guards || task.control.get().is_some_and(depends_on_place) {
+            if !leaves_out {
+                return None;
+            }
+            if runnable_tasks(vm).count() > 1 || self.has_timers && time_may_pass(vm) {
+                self.skipped += 1;
+            }
+        } else {
             way.ticks = ticks;
-        } else if runnable_tasks(vm).count() > 1 || self.has_timers && time_may_pass(vm) {
-            self.skipped += 1;
         }
         Some(index)
     }

@@ -6,7 +6,6 @@ use super::Subject;
 use super::keep::Keeper;
 use super::livelock::{NO_TASK, StateStep, StateTasks, StepCause, TIME};
 use super::point::{PointRun, living_tasks};
-use super::races::{RaceNotes, RaceWatch, Races};
 use super::search::{MadeChoice, ROOT, Search};
 use super::step::Runnable;
 use super::worker::{ClaimedStep, Claims, RunPlace};
@@ -101,22 +100,21 @@ pub(super) enum TraceEnd<T> {
 pub(super) struct RunTrace<T> {
     pub(super) steps: Vec<TraceStep>,
     pub(super) end: TraceEnd<T>,
-    /// The uses of variables on the way.
-    pub(super) notes: RaceNotes,
+    /// Whether a request has reached a task that could run.
+    pub(super) was_requested: bool,
 }
 
 /// A machine of a search with its places, and the subject that began it.
 pub(super) struct Tracer<'a, S> {
     settings: &'a Settings,
-    races: &'a Races,
     keeper: Keeper<'a>,
     subject: S,
 }
 
 impl<'a, S: Subject> Tracer<'a, S> {
     /// Creates a tracer that may take so many bytes for snapshots.
-    pub(super) fn new(settings: &'a Settings, races: &'a Races, memory: usize, subject: S) -> Tracer<'a, S> {
-        Tracer { settings, races, keeper: Keeper::new(settings, memory), subject }
+    pub(super) fn new(settings: &'a Settings, memory: usize, subject: S) -> Tracer<'a, S> {
+        Tracer { settings, keeper: Keeper::new(settings, memory), subject }
     }
 
     /// Takes note of what the search has made of the last batch.
@@ -140,8 +138,8 @@ impl<'a, S: Subject> Tracer<'a, S> {
         (number, claims): (usize, &Claims),
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Result<RunTrace<S::Ending>, S::Error> {
-        let Tracer { settings, races, keeper, subject } = self;
-        let mut watch = RaceWatch::new(races);
+        let Tracer { settings, keeper, subject } = self;
+        let mut was_requested = false;
         let (mut machine, mut run, choices) = keeper.go_to(search, place.node, || subject.begin())?;
         let parent = search.nodes[place.node as usize].parent;
         let mut given = choices.into_iter();
@@ -149,8 +147,8 @@ impl<'a, S: Subject> Tracer<'a, S> {
         let mut end = TraceEnd::Known;
         let mut before: Option<TasksAtPoint> = None;
         let most = settings.states.min(settings.memory / STEP_BYTES);
-        let watched = settings.reduce.then_some(&mut watch);
-        let outcome = run.go_on(&mut machine, u64::MAX, watched, &mut |vm, run, runnable| {
+        let requested = settings.reduce.then_some(&mut was_requested);
+        let outcome = run.go_on(&mut machine, u64::MAX, requested, &mut |vm, run, runnable| {
             if given.len() == 1 && runnable.count() > 1 {
                 keeper.keep_on_the_way(vm, run, search, parent);
             }
@@ -194,7 +192,7 @@ impl<'a, S: Subject> Tracer<'a, S> {
             end = TraceEnd::Ended(subject.judge(&mut machine, outcome));
         }
         keeper.take_back(machine);
-        Ok(RunTrace { steps, end, notes: watch.notes })
+        Ok(RunTrace { steps, end, was_requested })
     }
 }
 

@@ -7,7 +7,7 @@ use super::{Signal, code_of, constant, failure, word_at};
 use crate::describe::describe;
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::{Exit, Raised};
-use crate::schedule::{SharedUse, UsedPlace, VariableUse};
+use crate::schedule::{SharedUse, UsedPlace};
 use crate::shape::{CodeKind, Shape};
 use crate::task::{Binding, TaskNumber};
 use crate::value::Value;
@@ -20,15 +20,13 @@ use crate::vm::Vm;
 /// `symbol` is a Symbol.
 #[inline(never)]
 pub(super) unsafe fn bound_value(vm: &mut Vm, symbol: Value) -> Value {
+    vm.scheduler.points.note_shown();
     let bindings = vm.scheduler.running.as_ref().map(|task| &task.control.bindings);
     // SAFETY: by the contract this is a live Symbol.
     let global = unsafe { (*symbol.object_ptr().cast::<SymbolObject>()).value };
     let bound = bindings.and_then(|bindings| bindings.get(symbol));
-    if bound.is_none() {
-        vm.note_variable(symbol, false);
-        if vm.scheduler.points.uses.is_some() {
-            vm.tell_use(symbol, global, false);
-        }
+    if bound.is_none() && vm.scheduler.points.uses.is_some() {
+        vm.tell_use(symbol, global, false);
     }
     bound.unwrap_or(global)
 }
@@ -41,7 +39,7 @@ pub(super) unsafe fn symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value)
     unsafe {
         let word = word_at(pc);
         let symbol = constant(base, word.d());
-        vm.note_read(symbol);
+        vm.scheduler.points.note_shown();
         match vm.symbol_value(symbol) {
             Some(value) => {
                 *base.add(word.a()) = value;
@@ -153,39 +151,18 @@ impl Vm {
             return self.refuse_constant(symbol, "set");
         }
         if flags & SymbolObject::EVER_BOUND != 0 {
+            self.scheduler.points.note_shown();
             let task = self.scheduler.running.as_mut();
             if let Some(place) = task.and_then(|task| task.control.bindings.get_mut(symbol)) {
                 *place = value;
                 return Ok(());
             }
-            self.note_variable(symbol, true);
             if self.scheduler.points.uses.is_some() {
                 self.tell_use(symbol, value, true);
             }
         }
         self.heap.symbol_set_value(symbol, value);
         Ok(())
-    }
-
-    /// Notes for an exploration that the running task uses the global value of a special variable.
-    #[inline]
-    pub(crate) fn note_variable(&mut self, symbol: Value, is_set: bool) {
-        if self.scheduler.points.notes_variables {
-            let task = self.scheduler.running.as_ref().map_or(TaskNumber::NONE, |task| task.number);
-            self.scheduler.points.note_variable(VariableUse { task, symbol, is_set });
-        }
-    }
-
-    /// Notes for an exploration that the running task reads a special variable, unless it has bound it.
-    #[inline]
-    pub(crate) fn note_read(&mut self, symbol: Value) {
-        let is_bound = |vm: &Vm| {
-            let task = vm.scheduler.running.as_ref();
-            task.is_some_and(|task| task.control.bindings.get(symbol).is_some())
-        };
-        if self.scheduler.points.notes_variables && !is_bound(self) {
-            self.note_variable(symbol, false);
-        }
     }
 
     /// Notes for the report of a schedule that the running task uses a special variable.

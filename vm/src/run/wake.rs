@@ -24,7 +24,7 @@ pub(super) fn call_attention(vm: &mut Vm, index: TaskIndex) {
     if task.state != TaskState::Ended {
         task.flags.set_attention(true);
         let points = &mut vm.scheduler.points;
-        points.was_hit |= points.notes_variables && task.state == TaskState::Runnable;
+        points.was_hit |= points.grain.is_some() && task.state == TaskState::Runnable;
         make_runnable(vm, index, true);
     }
 }

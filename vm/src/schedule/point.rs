@@ -68,17 +68,6 @@ pub(crate) struct SharedUse {
     pub(crate) place: Option<String>,
 }
 
-/// A use of the global value of a special variable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct VariableUse {
-    /// The task.
-    pub(crate) task: TaskNumber,
-    /// The variable, a symbol.
-    pub(crate) symbol: Value,
-    /// Whether the value was set.
-    pub(crate) is_set: bool,
-}
-
 /// Where tasks stop while schedules are explored.
 #[derive(Clone, Default)]
 pub(crate) struct Points {
@@ -91,10 +80,6 @@ pub(crate) struct Points {
     /// Whether the running task has passed a point, or has done something else that other tasks can see,
     /// since the last tick.
     pub(crate) has_shown: bool,
-    /// Whether uses of special variables are noted.
-    pub(crate) notes_variables: bool,
-    /// The uses of global values of special variables since the last tick.
-    pub(crate) variables: Vec<VariableUse>,
     /// Whether a request to end or to leave a form, or an interrupt, has reached a task that could run.
     pub(crate) was_hit: bool,
     /// Whether there are guards, which may interrupt tasks anywhere.
@@ -114,14 +99,6 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    /// Notes a use of the global value of a special variable.
-    #[cold]
-    pub(crate) fn note_variable(&mut self, used: VariableUse) {
-        if !self.variables.contains(&used) {
-            self.variables.push(used);
-        }
-    }
-
     /// Notes that the running task has done something that other tasks can see, or has looked at it.
     #[inline]
     pub(crate) fn note_shown(&mut self) {
