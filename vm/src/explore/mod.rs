@@ -138,7 +138,7 @@ pub struct Settings {
     /// Whether tasks also stop before each use of a place that others may reach, in a program that was
     /// compiled with points.
     pub strict: bool,
-    /// Whether points are left out, at grain `variables`, that are needed only where requests reach tasks that
+    /// Whether points are left out, at grain `variables`, that matter only where requests reach tasks which
     /// could run, until a run has shown one. The findings are the same without, in more states.
     pub reduce: bool,
     /// Whether states also differ by the time, because the program reads the clock. Without this, times are
@@ -172,7 +172,7 @@ impl Settings {
     }
 
     /// Returns the settings of a search that leaves no points out. At a tick a task may hold a time that the
-    /// library has read, such as the deadline of a sleep; so where ticks are points, states differ by the time.
+    /// library has read, as the deadline of a sleep; so where ticks are points, states differ by the time.
     fn with_all_points(&self) -> Settings {
         let clock = self.clock || self.grain == Grain::Variables;
         Settings { reduce: false, clock, ..*self }
@@ -381,7 +381,7 @@ pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
 /// Runs of a batch: few enough that the shortest schedules come first, and enough for all threads.
 const BATCH: usize = 64;
 
-/// Searches with the help of workers. Returns `None` if points are left out that runs have shown to be needed.
+/// Searches with the help of workers. Returns `None` if points that are left out have shown to be needed.
 fn search_by<T: PartialEq + Clone, E>(
     settings: &Settings,
     search: &RwLock<Search>,
