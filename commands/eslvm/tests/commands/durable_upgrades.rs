@@ -5,7 +5,8 @@ use std::process::Stdio;
 use crate::durable::Agent;
 use crate::eslvm;
 
-/// An agent that counts by `step`, and keeps what it has counted in structures.
+/// An agent that counts by `step`, and keeps what it has counted in structures. It waits long enough between
+/// its lines to be killed there.
 const AGENT: &str = "(defstruct leg metres)
 (defparameter *unit* \"m\")
 (defvar *legs* nil)
@@ -19,7 +20,7 @@ const AGENT: &str = "(defstruct leg metres)
 (dotimes (i 6)
   (note i)
   (unless *first* (setq *first* (first *legs*)))
-  (sleep 0.2))
+  (sleep 1))
 (report)
 (say \"~a\" (eq *first* (first (last *legs*))))
 (exit 7)";
