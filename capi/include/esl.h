@@ -342,7 +342,8 @@ typedef struct esl_reply esl_reply;
 typedef struct esl_task esl_task;
 
 /**
- * A watch over facts. It belongs to the caller, and lasts until it is freed. From any thread, one at a time.
+ * A watch, over facts or over all events of a run. It belongs to the caller, and lasts until it is freed.
+ * From any thread, one at a time.
  */
 typedef struct esl_watch esl_watch;
 
@@ -899,6 +900,25 @@ esl_reply *esl_task_into_reply(esl_task *task);
 void esl_task_free(esl_task *task);
 
 /**
+ * Asks for the tasks that have not ended, in the order in which they were made. The answer is a list of
+ * property lists: ((:NUMBER 3 :MAKER 0 :NAME "PATROL-1" :WAITS-FOR "the timer" :TICKS 120)), where the maker
+ * is 0 for a task that the embedder has made, and `:WAITS-FOR` is `NIL` for one that can run.
+ *
+ * The caller sees to it that
+ * `handle` is a handle; `reply` and `failure` are places that can be written, or null.
+ */
+esl_status esl_handle_tasks(const esl_handle *handle, esl_reply **reply, esl_failure **failure);
+
+/**
+ * Aborts the task with this number, which `esl_handle_tasks` and observers tell. Nothing happens if it has
+ * ended.
+ *
+ * The caller sees to it that
+ * `handle` is a handle.
+ */
+esl_status esl_handle_abort(const esl_handle *handle, uint64_t task);
+
+/**
  * Has no task run, until `esl_handle_resume` or the end of the last handle. The clock goes on, if it is
  * not virtual.
  *
@@ -985,17 +1005,19 @@ void *esl_value_object(const esl_value *value, const char *type);
 bool esl_object_close(const esl_value *value);
 
 /**
- * Has an observer told what happens in the run, from the next turn on until the end of the engine. With a
- * status other than `ESL_OK`, `user` is freed at once. From any thread.
+ * Has an observer told what happens in the run, from the next turn on, until the watch is freed: `user` is
+ * freed before the next event then. Where `watch` is null, until the end of the engine. With a status other
+ * than `ESL_OK`, `user` is freed at once. From any thread.
  *
  * The caller sees to it that
- * `handle` is a handle; `observer` and `destructor` can be called with `user`; `failure` is a place that can
- * be written, or null.
+ * `handle` is a handle; `observer` and `destructor` can be called with `user`; `watch` and `failure` are
+ * places that can be written, or null.
  */
 esl_status esl_handle_subscribe(const esl_handle *handle,
                                 esl_observer observer,
                                 void *user,
                                 esl_destructor destructor,
+                                esl_watch **watch,
                                 esl_failure **failure);
 
 /**

@@ -577,6 +577,15 @@ struct seen {
     std::string_view text;
 };
 
+// A watch over facts, or over all events of a run, until it is destroyed.
+class watch {
+public:
+    explicit watch(esl_watch *owned) : object(owned) {}
+
+private:
+    owner<esl_watch, esl_watch_free> object;
+};
+
 // A way into a run, from all threads.
 class handle {
 public:
@@ -620,19 +629,26 @@ public:
                 thrown);
         return esl::task(result);
     }
+    // The tasks that have not ended: property lists with number, maker, name, waits-for and ticks.
+    reply tasks() {
+        esl_reply *result = nullptr;
+        esl_failure *thrown = nullptr;
+        require(esl_handle_tasks(object.get(), &result, &thrown), thrown);
+        return reply(result);
+    }
+    // Aborts the task with this number. Nothing happens if it has ended.
+    void abort(std::uint64_t task) { esl_handle_abort(object.get(), task); }
     // Has a function called with each event of the run (esl::seen), on the thread of the engine.
     template <typename F>
     void subscribe(F observer) {
-        auto call = [](void *user, const esl_seen *event) {
-            try {
-                (*static_cast<F *>(user))(seen{event->event, std::chrono::nanoseconds(event->time), event->task,
-                                               event->other_task, event->is_hidden, event->text});
-            } catch (...) {
-                // Nothing waits for it, and the run goes on.
-            }
-        };
-        esl_failure *thrown = nullptr;
-        require(esl_handle_subscribe(object.get(), call, new F(std::move(observer)), destroy<F>, &thrown), thrown);
+        subscribe(std::move(observer), nullptr);
+    }
+    // The same, until the watch is destroyed.
+    template <typename F>
+    [[nodiscard]] esl::watch watch_run(F observer) {
+        esl_watch *watch = nullptr;
+        subscribe(std::move(observer), &watch);
+        return esl::watch(watch);
     }
     void pause() { esl_handle_pause(object.get()); }
     void resume() { esl_handle_resume(object.get()); }
@@ -648,6 +664,20 @@ public:
 private:
     owner<esl_handle, esl_handle_free> object;
 
+    template <typename F>
+    void subscribe(F observer, esl_watch **watch) {
+        auto call = [](void *user, const esl_seen *event) {
+            try {
+                (*static_cast<F *>(user))(seen{event->event, std::chrono::nanoseconds(event->time), event->task,
+                                               event->other_task, event->is_hidden, event->text});
+            } catch (...) {
+                // Nothing waits for it, and the run goes on.
+            }
+        };
+        esl_failure *thrown = nullptr;
+        require(esl_handle_subscribe(object.get(), call, new F(std::move(observer)), destroy<F>, watch, &thrown),
+                thrown);
+    }
     template <typename F>
     reply ask(F question, const value &asked) {
         esl_reply *result = nullptr;
@@ -694,15 +724,6 @@ struct settings {
     bool is_recorded = false;
     // Repeats a recording, without the outside.
     std::optional<recording> replayed = std::nullopt;
-};
-
-// A watch over facts, until it is destroyed.
-class watch {
-public:
-    explicit watch(esl_watch *owned) : object(owned) {}
-
-private:
-    owner<esl_watch, esl_watch_free> object;
 };
 
 // A machine in which programs run. It serves one thread at a time.

@@ -271,6 +271,38 @@ pub unsafe extern "C" fn esl_task_free(task: *mut esl_task) {
     freeing(|| drop(unsafe { take(task) }));
 }
 
+/// Asks for the tasks that have not ended, in the order in which they were made. The answer is a list of
+/// property lists: ((:NUMBER 3 :MAKER 0 :NAME "PATROL-1" :WAITS-FOR "the timer" :TICKS 120)), where the maker
+/// is 0 for a task that the embedder has made, and `:WAITS-FOR` is `NIL` for one that can run.
+///
+/// # Safety
+/// `handle` is a handle; `reply` and `failure` are places that can be written, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_handle_tasks(
+    handle: *const esl_handle,
+    reply: *mut *mut esl_reply,
+    failure: *mut *mut esl_failure,
+) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe {
+        guarded(failure, || {
+            hand(reply, AwaitedAnswer::Tasks(look(handle)?.0.tasks()).into_reply());
+            Ok(())
+        })
+    }
+}
+
+/// Aborts the task with this number, which `esl_handle_tasks` and observers tell. Nothing happens if it has
+/// ended.
+///
+/// # Safety
+/// `handle` is a handle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_handle_abort(handle: *const esl_handle, task: u64) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe { tell(handle, |handle| handle.abort(task)) }
+}
+
 /// Tells a run something.
 ///
 /// # Safety

@@ -2,13 +2,16 @@
 
 use std::ffi::{c_char, c_void};
 use std::ptr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use esl::engine::{Observer, Seen, TaskNumber};
 
-use crate::border::{guarded, look};
+use crate::border::{guarded, hand, look};
 use crate::failure::{c_text, esl_failure};
 use crate::function::{UserData, esl_destructor, no_callback};
 use crate::handle::esl_handle;
+use crate::program::{Watched, esl_watch};
 use crate::status::esl_status;
 
 /// Kind of an event of a run.
@@ -79,9 +82,23 @@ pub type esl_observer = Option<unsafe extern "C" fn(user: *mut c_void, seen: *co
 struct ObserverOfC {
     function: unsafe extern "C" fn(user: *mut c_void, seen: *const esl_seen),
     user: UserData,
+    is_over: Arc<AtomicBool>,
+}
+
+/// Ends an observer when it is dropped.
+pub(crate) struct RunWatch(Arc<AtomicBool>);
+
+impl Drop for RunWatch {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }
 
 impl Observer for ObserverOfC {
+    fn is_over(&self) -> bool {
+        self.is_over.load(Ordering::Relaxed)
+    }
+
     fn see(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>) {
         let mut other_task = 0;
         let mut is_hidden_task = false;
@@ -119,18 +136,20 @@ impl Observer for ObserverOfC {
     }
 }
 
-/// Has an observer told what happens in the run, from the next turn on until the end of the engine. With a
-/// status other than `ESL_OK`, `user` is freed at once. From any thread.
+/// Has an observer told what happens in the run, from the next turn on, until the watch is freed: `user` is
+/// freed before the next event then. Where `watch` is null, until the end of the engine. With a status other
+/// than `ESL_OK`, `user` is freed at once. From any thread.
 ///
 /// # Safety
-/// `handle` is a handle; `observer` and `destructor` can be called with `user`; `failure` is a place that can
-/// be written, or null.
+/// `handle` is a handle; `observer` and `destructor` can be called with `user`; `watch` and `failure` are
+/// places that can be written, or null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn esl_handle_subscribe(
     handle: *const esl_handle,
     observer: esl_observer,
     user: *mut c_void,
     destructor: esl_destructor,
+    watch: *mut *mut esl_watch,
     failure: *mut *mut esl_failure,
 ) -> esl_status {
     let user = UserData::new(user, destructor);
@@ -138,7 +157,11 @@ pub unsafe extern "C" fn esl_handle_subscribe(
     unsafe {
         guarded(failure, || {
             let function = observer.ok_or_else(no_callback)?;
-            look(handle)?.0.subscribe(ObserverOfC { function, user });
+            let is_over = Arc::<AtomicBool>::default();
+            look(handle)?.0.subscribe(ObserverOfC { function, user, is_over: is_over.clone() });
+            if !watch.is_null() {
+                hand(watch, esl_watch(Watched::Run(RunWatch(is_over))));
+            }
             Ok(())
         })
     }

@@ -10,6 +10,7 @@ use crate::border::{freeing, guarded, hand, look_within, store, take, text};
 use crate::engine::esl_engine;
 use crate::failure::esl_failure;
 use crate::function::{UserData, esl_destructor, no_callback};
+use crate::observer::RunWatch;
 use crate::status::esl_status;
 use crate::value::esl_value;
 
@@ -97,8 +98,15 @@ pub unsafe extern "C" fn esl_definitions(
     }
 }
 
-/// A watch over facts. It belongs to the caller, and lasts until it is freed. From any thread, one at a time.
-pub struct esl_watch(#[expect(dead_code, reason = "it is held until it is dropped")] FactWatch);
+/// A watch, over facts or over all events of a run. It belongs to the caller, and lasts until it is freed.
+/// From any thread, one at a time.
+pub struct esl_watch(#[expect(dead_code, reason = "it is held until it is dropped")] pub(crate) Watched);
+
+/// What a watch is over; the watch ends when this is dropped.
+pub(crate) enum Watched {
+    Facts(#[expect(dead_code, reason = "it is held until it is dropped")] FactWatch),
+    Run(#[expect(dead_code, reason = "it is held until it is dropped")] RunWatch),
+}
 
 /// A function that is told of a change of a fact: whether the fact is in the database now, the fact, and the
 /// values of the pattern's variables in it, a property list such as (:ROBOT ROVER :PLACE RIDGE). Both live
@@ -158,7 +166,7 @@ pub unsafe extern "C" fn esl_watch_facts(
             let watcher = WatcherOfC { function: function.ok_or_else(no_callback)?, user };
             let pattern = look_within(pattern)?.0.clone();
             let begun = esl_engine::lock(engine)?.watch_facts(pattern, move |change| watcher.tell(change))?;
-            hand(watch, esl_watch(begun));
+            hand(watch, esl_watch(Watched::Facts(begun)));
             Ok(())
         })
     }

@@ -7,6 +7,7 @@ use std::task::{Context, Poll, Wake, Waker};
 
 use esl::Data;
 use esl::engine::{QueryAnswer, Reply};
+use esl::host::TaskInfo;
 
 use crate::border::{freeing, guarded, hand, look, take};
 use crate::failure::{Fault, esl_failure};
@@ -33,6 +34,7 @@ pub(crate) enum AwaitedAnswer {
     Truth(Reply<bool>),
     Count(Reply<i64>),
     Facts(Reply<Vec<QueryAnswer>>),
+    Tasks(Reply<Vec<TaskInfo>>),
     /// The answer has come, and waits to be taken.
     Come(Result<Data, esl::Error>),
     /// The answer was taken.
@@ -76,6 +78,21 @@ fn data_of(answers: Vec<QueryAnswer>) -> Data {
     }))
 }
 
+/// Returns a list of property lists.
+fn data_of_tasks(tasks: Vec<TaskInfo>) -> Data {
+    let number = |number: u64| Data::Integer(i64::try_from(number).unwrap_or(i64::MAX));
+    Data::list(tasks.into_iter().map(|task| {
+        let row = [
+            ("NUMBER", number(task.number)),
+            ("MAKER", number(task.maker)),
+            ("NAME", Data::String(task.name)),
+            ("WAITS-FOR", task.waits_for.map_or(Data::Nil, Data::String)),
+            ("TICKS", number(task.ticks)),
+        ];
+        Data::list(row.into_iter().flat_map(|(name, value)| [Data::Keyword(name.to_owned()), value]))
+    }))
+}
+
 impl AwaitedAnswer {
     pub(crate) fn into_reply(self) -> esl_reply {
         esl_reply(Mutex::new(self), Process::this())
@@ -88,6 +105,7 @@ impl AwaitedAnswer {
             AwaitedAnswer::Truth(reply) => poll(reply, waker, Data::boolean),
             AwaitedAnswer::Count(reply) => poll(reply, waker, Data::Integer),
             AwaitedAnswer::Facts(reply) => poll(reply, waker, data_of),
+            AwaitedAnswer::Tasks(reply) => poll(reply, waker, data_of_tasks),
             AwaitedAnswer::Come(_) | AwaitedAnswer::Taken => return true,
         };
         come.map(|result| *self = AwaitedAnswer::Come(result)).is_some()
@@ -99,6 +117,7 @@ impl AwaitedAnswer {
             AwaitedAnswer::Truth(reply) => reply.take().map(|result| result.map(Data::boolean)),
             AwaitedAnswer::Count(reply) => reply.take().map(|result| result.map(Data::Integer)),
             AwaitedAnswer::Facts(reply) => reply.take().map(|result| result.map(data_of)),
+            AwaitedAnswer::Tasks(reply) => reply.take().map(|result| result.map(data_of_tasks)),
             AwaitedAnswer::Come(result) => Some(result.clone()),
             AwaitedAnswer::Taken => Some(Err(esl::Error::Ended)),
         }
@@ -110,6 +129,7 @@ impl AwaitedAnswer {
             AwaitedAnswer::Truth(reply) => reply.wait().map(Data::boolean),
             AwaitedAnswer::Count(reply) => reply.wait().map(Data::Integer),
             AwaitedAnswer::Facts(reply) => reply.wait().map(data_of),
+            AwaitedAnswer::Tasks(reply) => reply.wait().map(data_of_tasks),
             AwaitedAnswer::Come(result) => result,
             AwaitedAnswer::Taken => Err(esl::Error::Ended),
         }

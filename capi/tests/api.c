@@ -291,8 +291,9 @@ static void watching(void) {
     esl_engine *engine = new_engine(config);
     esl_handle *handle = NULL;
     CHECK(esl_engine_handle(engine, &handle, NULL) == ESL_OK);
-    CHECK(esl_handle_subscribe(handle, observe, &events, NULL, NULL) == ESL_OK);
-    CHECK(esl_handle_subscribe(handle, NULL, NULL, NULL, NULL) == ESL_INVALID_ARGUMENT);
+    esl_watch *watch = NULL;
+    CHECK(esl_handle_subscribe(handle, observe, &events, NULL, NULL, NULL) == ESL_OK);
+    CHECK(esl_handle_subscribe(handle, NULL, NULL, NULL, &watch, NULL) == ESL_INVALID_ARGUMENT && !watch);
     CHECK(esl_define(engine, "add", "(a b)", "The sum.", add, &user, NULL, NULL) == ESL_OK);
     const char *text = "(progn (assert '(at rover ridge)) (handler-case (fail :lost) (failure () nil)) (princ (add 40 2))"
                        "       (list (random 1000) (get-universal-time)))";
@@ -314,6 +315,23 @@ static void watching(void) {
     esl_engine_free(engine);
     esl_engine_free(replay);
     esl_config_free(config);
+}
+
+/* An observer until its watch is freed, and one until the end of the engine. */
+static void watching_for_a_while(void) {
+    struct seen_events all = {0}, some = {0};
+    esl_engine *engine = new_engine(NULL);
+    esl_handle *handle = NULL;
+    esl_watch *watch = NULL;
+    CHECK(esl_engine_handle(engine, &handle, NULL) == ESL_OK);
+    CHECK(esl_handle_subscribe(handle, observe, &all, NULL, NULL, NULL) == ESL_OK);
+    CHECK(esl_handle_subscribe(handle, observe, &some, NULL, &watch, NULL) == ESL_OK);
+    CHECK(gives(engine, "(assert '(at rover ridge))", "T"));
+    esl_watch_free(watch);
+    CHECK(gives(engine, "(assert '(at lander ridge))", "T"));
+    CHECK(all.facts == 2 && some.facts == 1);
+    esl_handle_free(handle);
+    esl_engine_free(engine);
 }
 
 static atomic_int is_over;
@@ -356,6 +374,22 @@ static void *operate(void *argument) {
     esl_task *task = NULL;
     CHECK(esl_handle_spawn(handle, "patrol", NULL, 0, &task, NULL) == ESL_OK);
     CHECK(esl_task_abort(task) == ESL_OK);
+    reply = esl_task_into_reply(task);
+    CHECK(esl_reply_wait(reply, &answer, NULL) == ESL_ABORTED);
+    esl_reply_free(reply);
+
+    /* A task by its number: that of the list's last row, the newest task. */
+    CHECK(esl_handle_spawn(handle, "patrol", NULL, 0, &task, NULL) == ESL_OK);
+    CHECK(esl_handle_tasks(handle, &reply, NULL) == ESL_OK);
+    CHECK(esl_reply_wait(reply, &answer, NULL) == ESL_OK);
+    esl_reply_free(reply);
+    int64_t number = 0;
+    const esl_value *row = esl_value_item(answer, esl_value_count(answer) - 1);
+    char *key = esl_value_print(esl_value_item(row, 0));
+    CHECK(strcmp(key, ":NUMBER") == 0 && esl_value_integer(esl_value_item(row, 1), &number));
+    esl_text_free(key);
+    esl_value_free(answer);
+    CHECK(esl_handle_abort(handle, (uint64_t)number) == ESL_OK);
     reply = esl_task_into_reply(task);
     CHECK(esl_reply_wait(reply, &answer, NULL) == ESL_ABORTED);
     esl_reply_free(reply);
@@ -498,6 +532,7 @@ int main(void) {
     json();
     objects();
     watching();
+    watching_for_a_while();
     threads();
     bad_use();
     processes();

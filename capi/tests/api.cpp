@@ -106,6 +106,15 @@ static void watching() {
     replay.define("roll", "()", "A number.", []() -> int { throw std::runtime_error("it is not called"); });
     CHECK(replay.eval(text).print() == time.print() && repeated == printed);
     CHECK(replay.canary() == engine.canary());
+    int watched = 0;
+    {
+        esl::watch watch = engine.handle().watch_run([&](const esl::seen &event) {
+            if (event.event == ESL_FACT_ASSERTED) watched++;
+        });
+        engine.eval("(assert '(at rover dock))");
+    }
+    engine.eval("(assert '(at rover lander))");
+    CHECK(watched == 1);
     esl::task patrol = engine.handle().spawn("sleep", {3600});
     patrol.abort();
     engine.run();

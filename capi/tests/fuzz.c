@@ -222,8 +222,20 @@ static void one_call(void) {
         KEEP(esl_task, task);
         break;
     }
-    case 28: esl_task_abort(ANY(esl_task)); break;
-    case 29: status = esl_handle_subscribe(ANY(esl_handle), below(3) ? observe : NULL, &dropped, drop, &failure); break;
+    case 28:
+        switch (below(3)) {
+        case 0: status = esl_handle_tasks(ANY(esl_handle), &reply, &failure); break;
+        case 1: esl_handle_abort(ANY(esl_handle), below(40)); break;
+        default: esl_task_abort(ANY(esl_task));
+        }
+        break;
+    case 29: {
+        esl_watch *watch = NULL;
+        status = esl_handle_subscribe(ANY(esl_handle), below(3) ? observe : NULL, &dropped, drop,
+                                      below(2) ? &watch : NULL, &failure);
+        esl_watch_free(watch);
+        break;
+    }
     case 30: {
         /* An evaluation of a run that is paused waits. */
         esl_handle *handle = ANY(esl_handle);
