@@ -70,7 +70,7 @@ impl Translator<'_, '_> {
             let result = self.on_fixnums(operation, x.0, y.0, exit);
             return self.set(dst, result, Known::Fixnum);
         }
-        let (slow, done) = (self.cold_block(), self.block_with_value());
+        let (slow, zeros, done) = (self.cold_block(), self.cold_block(), self.block_with_value());
         if operation != Arithmetic::Divide
             && let Some(test) = self.not_fixnums(x, y)
         {
@@ -88,11 +88,44 @@ impl Translator<'_, '_> {
             self.branch(difference, mixed, doubles);
             self.go_to(doubles);
             let (p, q) = (self.decode(x.0), self.decode(y.0));
-            self.on_doubles(operation, p, q, slow, done.0);
+            self.on_doubles(operation, p, q, zeros, done.0);
             self.go_to(mixed);
         }
-        self.mixed(operation, x, y, slow, done.0);
+        if x.1 == Known::Fixnum && y.1 == Known::Fixnum {
+            self.jump(slow);
+        } else {
+            self.mixed(operation, x, y, zeros, done.0);
+            self.go_to(zeros);
+            self.on_zeros(operation, x, y, slow, done.0);
+        }
         self.finish_value(slow, done, dst, Known::Nothing);
+    }
+
+    /// Arithmetic where an operand or the result may be a zero, which has a word of its own; others go to
+    /// `otherwise`.
+    fn on_zeros(
+        &mut self,
+        operation: Arithmetic,
+        x: (Ssa, Known),
+        y: (Ssa, Known),
+        otherwise: Block,
+        done: Block,
+    ) {
+        let [p, q] = [x, y].map(|(word, known)| match known {
+            Known::Fixnum => self.convert(word),
+            _ => self.double_of(word, otherwise),
+        });
+        let result = self.operate(operation, p, q);
+        let bits = self.bits_of(result);
+        let word = self.rotated(bits);
+        let (is_word, no_word) = (self.is_word(word), self.cold_block());
+        self.b.ins().brif(is_word, done, &[word.into()], no_word, &[]);
+        self.go_to(no_word);
+        let zero = self.b.ins().f64const(0.0);
+        let is_zero = self.b.ins().fcmp(FloatCC::Equal, result, zero);
+        self.require(is_zero, otherwise);
+        let zero = self.zero_of(bits);
+        self.jump_with(done, zero);
     }
 
     /// Arithmetic of which one operand is known to be a double.
@@ -214,7 +247,8 @@ impl Translator<'_, '_> {
         self.jump_with(done, word);
     }
 
-    /// Arithmetic on a fixnum and a double, in either order; others go to `otherwise`.
+    /// Arithmetic on a fixnum and a double, in either order; others go to `otherwise`. One of both may be a
+    /// double.
     fn mixed(
         &mut self,
         operation: Arithmetic,
@@ -223,9 +257,6 @@ impl Translator<'_, '_> {
         otherwise: Block,
         done: Block,
     ) {
-        if x.1 == Known::Fixnum && y.1 == Known::Fixnum {
-            return self.jump(otherwise);
-        }
         let (left, right) = (self.block(), self.block());
         let tag = self.b.ins().band_imm_s(x.0, 3);
         self.branch(tag, right, left);

@@ -257,17 +257,17 @@ impl Translator<'_, '_> {
     }
 
     /// Returns what the word of a double is, unless it is a zero.
-    fn rotated(&mut self, bits: Ssa) -> Ssa {
+    pub(crate) fn rotated(&mut self, bits: Ssa) -> Ssa {
         let biased = self.biased(bits);
         self.b.ins().rotl_imm_s(biased, 3)
     }
 
-    fn is_word(&mut self, rotated: Ssa) -> Ssa {
+    pub(crate) fn is_word(&mut self, rotated: Ssa) -> Ssa {
         let difference = self.differs_from_tag(rotated, TAG_DOUBLE, TAG_DOUBLE);
         self.equals(difference, 0)
     }
 
-    fn zero_of(&mut self, bits: Ssa) -> Ssa {
+    pub(crate) fn zero_of(&mut self, bits: Ssa) -> Ssa {
         let is_negative = self.b.ins().icmp_imm_s(IntCC::SignedLessThan, bits, 0);
         let negative = self.constant_value(Value::NEGATIVE_ZERO);
         let positive = self.constant_value(Value::POSITIVE_ZERO);

@@ -18,6 +18,7 @@ use crate::emit::in_object;
 use crate::flow::{FlowStep, FrameChange};
 use crate::kinds::{Known, is_root};
 use crate::lookups::TableOperation;
+use crate::matrices::ElementOperation;
 use crate::objects::{ElementIndex, capture};
 use crate::translate::Translator;
 
@@ -307,9 +308,12 @@ impl Translator<'_, '_> {
             Instr::CallSelf { window, want, .. } => self.call_self(window.0, want, step.next),
             Instr::CallBuiltin { window, .. } if is_root(&step.instr, &self.known) => self.root(window.0),
             Instr::CallBuiltin { window, count, want: Want::ONE, builtin } => {
-                match TableOperation::of(builtin.0, count.0) {
-                    Some(operation) => self.lookup(window.0, count.0, operation),
-                    None => self.call_builtin(window.0, Want::ONE),
+                if let Some(operation) = TableOperation::of(builtin.0, count.0) {
+                    self.lookup(window.0, count.0, operation);
+                } else if let Some(operation) = ElementOperation::of(builtin.0, count.0) {
+                    self.matrix_element(window.0, operation);
+                } else {
+                    self.call_builtin(window.0, Want::ONE);
                 }
             }
             Instr::CallBuiltin { window, want, .. } => self.call_builtin(window.0, want),

@@ -53,6 +53,7 @@ mod instruction;
 mod kinds;
 mod lookups;
 pub mod maker;
+mod matrices;
 mod objects;
 mod places;
 mod special;

@@ -173,7 +173,7 @@ impl Translator<'_, '_> {
     }
 
     /// Goes on only if a builtin has nothing to see to afterwards that came up before.
-    fn require_nothing_due(&mut self, otherwise: Block) {
+    pub(crate) fn require_nothing_due(&mut self, otherwise: Block) {
         let gc_due = self.load_context(offset_of!(NativeContext, gc_due));
         let gc_due = self.b.ins().uload8(types::I64, memory(), gc_due, 0);
         let charges = self.load_context(offset_of!(NativeContext, charges));

@@ -16,9 +16,10 @@ use esl_vm::vm::Tier;
 use libtest_mimic::{Failed, Trial};
 
 /// Programs about work that machine code does in a way of its own.
-const ALWAYS: [&str; 4] = [
+const ALWAYS: [&str; 5] = [
     "limits/a_clause_that_uses_up_the_reserve_is_not_tried_again.esl",
     "limits/endless_recursion_through_dynamic_state.esl",
+    "stdlib/elements_of_two_dimensions.esl",
     "stdlib/tables_find_integers.esl",
     "stdlib/tables_find_keys_again.esl",
 ];

@@ -139,8 +139,24 @@ pub(super) fn aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     {
         return Ok(value);
     }
+    if let [array, row, column] = *arguments
+        && let Some(index) = index_in_matrix(&vm.heap, array, row, column)
+        && let Some(elements) = vm.heap.array(array).and_then(|array| vm.heap.vector(array.data))
+        && let Some(&value) = elements.get(index)
+    {
+        return Ok(value);
+    }
     let index = row_major_index(vm, arguments[0], &arguments[1..])?;
     element(vm, arguments[0], index)
+}
+
+/// Returns the index in its data of an element of an array of two dimensions that is not displaced, if both
+/// subscripts are below their dimensions.
+fn index_in_matrix(heap: &Heap, array: Value, row: Value, column: Value) -> Option<usize> {
+    let &[rows, columns] = heap.array_dimensions(array)? else { return None };
+    let is_displaced = heap.array(array).is_none_or(|array| array.offset.is_true());
+    let (row, column, columns) = (row.as_index()?, column.as_index()?, columns.as_index()?);
+    (!is_displaced && row < rows.as_index()? && column < columns).then(|| row * columns + column)
 }
 
 pub(super) fn set_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
