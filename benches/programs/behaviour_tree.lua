@@ -1,4 +1,4 @@
--- behaviour_tree: a tree of ten thousand nodes, ticked many times. A node is a function that returns a status.
+-- behaviour_tree: ten thousand nodes, ticked many times; each is a function that returns a status.
 
 local floor = math.floor
 local seed = 42

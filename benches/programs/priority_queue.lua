@@ -1,4 +1,4 @@
--- priority_queue: a binary heap of arrivals with an order that its user gives, and a simulation that uses it.
+-- priority_queue: a binary heap with an order that its user gives, and a simulation with it.
 
 local floor = math.floor
 

@@ -102,7 +102,7 @@ pub unsafe extern "C" fn esl_definitions(
 /// From any thread, one at a time.
 pub struct esl_watch(#[expect(dead_code, reason = "it is held until it is dropped")] pub(crate) Watched);
 
-/// What a watch is over; the watch ends when this is dropped.
+/// Facts or a run, over which a watch is; the watch ends when this is dropped.
 pub(crate) enum Watched {
     Facts(#[expect(dead_code, reason = "it is held until it is dropped")] FactWatch),
     Run(#[expect(dead_code, reason = "it is held until it is dropped")] RunWatch),

@@ -144,3 +144,15 @@ pub fn dimensions(heap: &Heap, array: Value) -> Option<SmallVec<[usize; 4]>> {
         None => total_size(heap, array).map(|size| smallvec![size]),
     }
 }
+
+/// Returns an element of an array of two dimensions that keeps any values and is not displaced, if both
+/// subscripts are below their dimensions.
+pub fn matrix_element(heap: &Heap, array: Value, row: Value, column: Value) -> Option<Value> {
+    let &[rows, columns] = heap.array_dimensions(array)? else { return None };
+    let array = heap.array(array)?;
+    let (row, column, columns) = (row.as_index()?, column.as_index()?, columns.as_index()?);
+    if array.offset.is_true() || row >= rows.as_index()? || column >= columns {
+        return None;
+    }
+    heap.vector(array.data)?.get(row * columns + column).copied()
+}

@@ -50,6 +50,7 @@ mod flow;
 pub mod helper;
 mod inlined;
 mod instruction;
+mod integers;
 mod kinds;
 mod lookups;
 pub mod maker;

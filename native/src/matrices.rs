@@ -15,7 +15,7 @@ use crate::emit::{ELEMENTS, WORD, in_object, memory};
 use crate::kinds::Known;
 use crate::translate::Translator;
 
-/// What a builtin does with an element.
+/// The operation of a builtin on an element.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ElementOperation {
     Get,
@@ -23,7 +23,7 @@ pub(crate) enum ElementOperation {
 }
 
 impl ElementOperation {
-    /// Returns what a builtin does, called with so many arguments, if it is an element of two dimensions.
+    /// Returns the operation of a builtin, called with so many arguments, if it is an element of two dimensions.
     pub(crate) fn of(builtin: u32, count: u8) -> Option<ElementOperation> {
         match count {
             3 if builtin == Builtin::Aref.number() => Some(ElementOperation::Get),

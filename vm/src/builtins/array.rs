@@ -4,7 +4,7 @@
 //! [`esl_heap::array`] reads them.
 
 pub(crate) use esl_heap::array::{ArrayElements, all_elements, storage, vector_elements, vector_length};
-use esl_heap::array::{MAX_DISPLACEMENTS, dimensions, total_size};
+use esl_heap::array::{MAX_DISPLACEMENTS, dimensions, matrix_element, total_size};
 
 use crate::builtins::list::list_items;
 use crate::builtins::sequence::copy_elements;
@@ -132,31 +132,17 @@ pub(super) fn set_svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    if let [array, index] = *arguments
-        && let Some(index) = index.as_index()
-        && let Some(elements) = ArrayElements::of_data(&vm.heap, array)
-        && let Some(value) = elements.get(index)
-    {
-        return Ok(value);
-    }
-    if let [array, row, column] = *arguments
-        && let Some(index) = index_in_matrix(&vm.heap, array, row, column)
-        && let Some(elements) = vm.heap.array(array).and_then(|array| vm.heap.vector(array.data))
-        && let Some(&value) = elements.get(index)
-    {
+    let of_simple = |array, index: Value| ArrayElements::of_data(&vm.heap, array)?.get(index.as_index()?);
+    let found = match *arguments {
+        [array, index] => of_simple(array, index),
+        [array, row, column] => matrix_element(&vm.heap, array, row, column),
+        _ => None,
+    };
+    if let Some(value) = found {
         return Ok(value);
     }
     let index = row_major_index(vm, arguments[0], &arguments[1..])?;
     element(vm, arguments[0], index)
-}
-
-/// Returns the index in its data of an element of an array of two dimensions that is not displaced, if both
-/// subscripts are below their dimensions.
-fn index_in_matrix(heap: &Heap, array: Value, row: Value, column: Value) -> Option<usize> {
-    let &[rows, columns] = heap.array_dimensions(array)? else { return None };
-    let is_displaced = heap.array(array).is_none_or(|array| array.offset.is_true());
-    let (row, column, columns) = (row.as_index()?, column.as_index()?, columns.as_index()?);
-    (!is_displaced && row < rows.as_index()? && column < columns).then(|| row * columns + column)
 }
 
 pub(super) fn set_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
