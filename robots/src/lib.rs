@@ -16,8 +16,37 @@ mod zenoh;
 use esl_host::{HostModule, HostRows};
 
 /// The modules. Those whose names begin with `ros-` are parts of `ros`, which requires them; so are those of
-/// `mavlink-`.
+/// `mavlink-` and `fleet-`.
 pub const MODULES: &[HostModule] = &[
+    HostModule { name: "fleet", text: include_str!("../modules/fleet.esl"), rows: HostRows::new },
+    HostModule {
+        name: "fleet-auctions",
+        text: include_str!("../modules/fleet-auctions.esl"),
+        rows: HostRows::new,
+    },
+    HostModule { name: "fleet-etcd", text: include_str!("../modules/fleet-etcd.esl"), rows: HostRows::new },
+    HostModule { name: "fleet-facts", text: include_str!("../modules/fleet-facts.esl"), rows: HostRows::new },
+    HostModule {
+        name: "fleet-leases",
+        text: include_str!("../modules/fleet-leases.esl"),
+        rows: HostRows::new,
+    },
+    HostModule {
+        name: "fleet-offers",
+        text: include_str!("../modules/fleet-offers.esl"),
+        rows: HostRows::new,
+    },
+    HostModule {
+        name: "fleet-requests",
+        text: include_str!("../modules/fleet-requests.esl"),
+        rows: HostRows::new,
+    },
+    HostModule {
+        name: "fleet-worlds",
+        text: include_str!("../modules/fleet-worlds.esl"),
+        rows: HostRows::new,
+    },
+    HostModule { name: "fleet-zenoh", text: include_str!("../modules/fleet-zenoh.esl"), rows: HostRows::new },
     HostModule { name: "mavlink", text: include_str!("../modules/mavlink.esl"), rows: mavlink::rows },
     HostModule {
         name: "mavlink-commands",

@@ -39,7 +39,7 @@ static ADDED: RwLock<Vec<&'static HostModule>> = RwLock::new(Vec::new());
 /// Modules of crates that a program may lack, and the feature of the commands that adds them. Those that
 /// begin with such a name and a hyphen are parts of them.
 const OPTIONAL: &[(&str, &str)] =
-    &[("mavlink", "robots"), ("mcap", "robots"), ("ros", "robots"), ("zenoh", "robots")];
+    &[("fleet", "robots"), ("mavlink", "robots"), ("mcap", "robots"), ("ros", "robots"), ("zenoh", "robots")];
 
 /// Adds modules of other crates for all machines that this process makes from now on, and for its
 /// compilations. A module in place of an earlier one of its name wins.

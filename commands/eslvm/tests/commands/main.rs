@@ -22,6 +22,8 @@ mod durable_upgrades;
 mod endings;
 mod examples;
 mod exploring;
+#[cfg(unix)]
+mod fleet;
 mod http;
 mod http_client;
 mod http_peers;

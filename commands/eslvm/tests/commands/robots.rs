@@ -88,12 +88,20 @@ impl Running {
 
 /// Starts a program, which may use a port of the loopback and is given it. The run is recorded.
 pub(crate) fn start_program(folder: &Folder, text: &str, port: u16, options: &[&str]) -> Running {
+    let mut all = vec!["--record", "run.eslj"];
+    all.extend(options);
+    start(folder, text, port, &all, &[])
+}
+
+/// Starts a program likewise with `options` and further `arguments`, and does not record the run.
+pub(crate) fn start(folder: &Folder, text: &str, port: u16, options: &[&str], arguments: &[&str]) -> Running {
     folder.file("main.esl", text);
     let port = port.to_string();
-    let mut arguments = vec!["run", "--allow-net=127.0.0.1", "--record", "run.eslj"];
-    arguments.extend(options);
-    arguments.extend(["main.esl", &port]);
-    Running::start(eslvm(&arguments).current_dir(folder.path()))
+    let mut all = vec!["run", "--allow-net=127.0.0.1"];
+    all.extend(options);
+    all.extend(["main.esl", &port]);
+    all.extend(arguments);
+    Running::start(eslvm(&all).current_dir(folder.path()))
 }
 
 fn wait_for_port(port: u16) {
