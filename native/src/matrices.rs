@@ -23,7 +23,8 @@ pub(crate) enum ElementOperation {
 }
 
 impl ElementOperation {
-    /// Returns the operation of a builtin, called with so many arguments, if it is an element of two dimensions.
+    /// Returns the operation of a builtin that is called with so many arguments, if it has one on elements of
+    /// arrays of two dimensions.
     pub(crate) fn of(builtin: u32, count: u8) -> Option<ElementOperation> {
         match count {
             3 if builtin == Builtin::Aref.number() => Some(ElementOperation::Get),
