@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Folders of documents; `docs` and `examples` with all that is below them.
-const FOLDERS: [&str; 25] = [
+const FOLDERS: [&str; 26] = [
     "",
     "benches",
     "bytecode",
@@ -24,6 +24,7 @@ const FOLDERS: [&str; 25] = [
     "language-server",
     "operate",
     "packaging",
+    "plans",
     "replay",
     "robots",
     "stdlib",

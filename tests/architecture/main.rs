@@ -28,7 +28,7 @@ const SECTIONS: [(&str, &str); 12] = [
 ];
 
 /// Folders of the packages that the table of tools lists as a whole.
-const TOOLS: [&str; 12] = [
+const TOOLS: [&str; 13] = [
     "commands/eslc",
     "commands/eslvm",
     "commands/shared",
@@ -36,6 +36,7 @@ const TOOLS: [&str; 12] = [
     "format",
     "language-server",
     "operate",
+    "plans",
     "replay",
     "syntax",
     "testing",
@@ -141,7 +142,7 @@ fn the_readmes_of_the_libraries_list_their_files() {
         let files = names_of_rows(section(&text, heading));
         assert_eq!(files, loaded, "stdlib/README.md and stdlib/{folder}load-order");
     }
-    for name in ["world", "robots", "trees"] {
+    for name in ["world", "robots", "trees", "plans"] {
         let there = modules(&root().join(name).join("modules"));
         let names: BTreeSet<String> = there.iter().map(|name| format!(":{name}")).collect();
         assert_eq!(
@@ -420,7 +421,7 @@ fn paths_in_code(text: &str) -> Vec<&str> {
 fn each_file_that_a_document_names_exists() {
     // Paths in `docs/mechanisms.md` are relative to the machine or the library.
     let bases = ["", "vm/src", "stdlib"];
-    let crates = CRATES_WITH_TABLES.iter().chain(&["stdlib", "world", "robots", "trees"]);
+    let crates = CRATES_WITH_TABLES.iter().chain(&["stdlib", "world", "robots", "trees", "plans"]);
     let readmes = crates.map(|name| format!("{name}/README.md"));
     let documents =
         ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md", "docs/glossary.md", "docs/mechanisms.md"];

@@ -202,8 +202,8 @@ fn is_message(text: &str) -> bool {
 
 #[test]
 fn prose_names_things_and_actors() {
-    let programs =
-        ["stdlib", "world/modules", "robots/modules", "trees/modules"].map(|folder| root().join(folder));
+    let programs = ["stdlib", "world/modules", "robots/modules", "trees/modules", "plans/modules"]
+        .map(|folder| root().join(folder));
     let mut found = Vec::new();
     for path in files_below(root().to_path_buf()) {
         let name = path_in_tree(&path);
@@ -236,7 +236,7 @@ fn prose_names_things_and_actors() {
 #[test]
 fn docstrings_begin_with_a_verb_that_acts() {
     let mut found = Vec::new();
-    for folder in ["stdlib", "world", "robots", "trees"] {
+    for folder in ["stdlib", "world", "robots", "trees", "plans"] {
         for path in files_below(root().join(folder)) {
             let mark = match path.extension().and_then(|extension| extension.to_str()) {
                 Some("esl") => ";",

@@ -56,6 +56,7 @@ pub const SIGNALLED: u8 = Ended::SIGNALLED;
 /// Adds the modules of the features that the command is built with. To be called before anything is compiled.
 pub fn add_modules() {
     esl_world::add_modules(esl_trees::MODULES);
+    esl_world::add_modules(esl_plans::MODULES);
     #[cfg(feature = "robots")]
     esl_world::add_modules(esl_robots::MODULES);
 }

@@ -51,6 +51,7 @@ fn findings(path: &Path, text: String) -> Vec<String> {
     let name = path.strip_prefix(root()).unwrap_or(path).display().to_string();
     esl_world::add_modules(esl_robots::MODULES);
     esl_world::add_modules(esl_trees::MODULES);
+    esl_world::add_modules(esl_plans::MODULES);
     let modules = ModulePath::new([path], &[]);
     let compiled = program::compile_with(&[Source::new(name.clone(), text)], &modules, Modules::Inside);
     let mut meant: Vec<(&str, usize)> =
@@ -72,7 +73,7 @@ fn findings(path: &Path, text: String) -> Vec<String> {
 
 #[test]
 fn examples_and_modules_have_no_warnings() {
-    let folders = ["examples", "world/modules", "robots/modules", "trees/modules"];
+    let folders = ["examples", "world/modules", "robots/modules", "trees/modules", "plans/modules"];
     let mut paths = folders.map(|folder| files(folder, "esl")).concat();
     // Parts of other modules, which are compiled with them: `ros-actions` of `ros`.
     let is_part = |path: &PathBuf| {

@@ -108,6 +108,8 @@ fn the_projects_own_files_are_formatted() {
         "stdlib",
         "world/modules",
         "robots/modules",
+        "plans/modules",
+        "plans/tests",
         "examples",
         "benches",
         "playground",

@@ -54,6 +54,7 @@ mod packages;
 mod patches;
 mod paths;
 mod peers;
+mod plans;
 #[cfg(unix)]
 mod playground;
 mod profile;

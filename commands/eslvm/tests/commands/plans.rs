@@ -1,0 +1,112 @@
+//! Plans: programs that use the module `plans`, with their expectations beside the lines, in the form of
+//! `conformance/README.md`. Each runs under the virtual clock with slices of the usual length, and with other
+//! schedules.
+
+use esl_conformance::{Expectations, process};
+
+use crate::{eslvm, listed, venv};
+
+/// The ways in which a program runs.
+const RUNS: [&[&str]; 3] = [&[], &["--slice", "7"], &["--seed", "5"]];
+
+mod programs {
+    test_files! { super::check, "plans/tests/programs", "esl":
+        a_broken_plan_is_repaired_while_others_run =
+            "a_broken_plan_is_repaired_while_others_run.esl",
+        activities_are_dispatched_by_windows = "activities_are_dispatched_by_windows.esl",
+        all_relations_bound_the_windows = "all_relations_bound_the_windows.esl",
+        conditions_resources_and_locks_delay_a_start =
+            "conditions_resources_and_locks_delay_a_start.esl",
+        contradictions_name_their_constraints =
+            "contradictions_name_their_constraints.esl",
+        controllability_is_that_of_a_game = "controllability_is_that_of_a_game.esl",
+        no_duration_breaks_a_controllable_plan =
+            "no_duration_breaks_a_controllable_plan.esl",
+        policies_choose_the_time_in_a_window = "policies_choose_the_time_in_a_window.esl",
+        windows_are_those_of_bellman_ford = "windows_are_those_of_bellman_ford.esl",
+    }
+}
+
+fn check(path: &str, text: &str) -> Result<(), String> {
+    RUNS.iter().try_for_each(|run| {
+        let options = [&["--clock", "virtual"], *run].concat();
+        check_run(path, text, &options, &[]).map_err(|fault| format!("{run:?}: {fault}"))
+    })
+}
+
+/// Runs a program with options and arguments, and compares with its expectations.
+fn check_run(path: &str, text: &str, options: &[&str], arguments: &[&str]) -> Result<(), String> {
+    let expected = Expectations::parse(text).map_err(|fault| fault.to_string())?;
+    let path = esl_conformance::root().join(path);
+    let mut command = eslvm(&["run"]);
+    command.args(options).arg(&path).args(arguments);
+    let found = process::run(&mut command, "");
+    let lines: Vec<&str> = found.output.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
+    let is_as_expected =
+        lines == expected.output && found.status == Some(i32::from(expected.expected_status()));
+    if is_as_expected {
+        return Ok(());
+    }
+    Err(format!("status {:?}\n{}\n{}", found.status, lines.join("\n"), found.errors))
+}
+
+/// The packages of Python that solve problems.
+const PLANNERS: [&str; 3] = ["unified-planning==1.3.0", "up-aries==0.5.0", "up-tamer==1.1.6"];
+
+/// Runs a program that uses a planner, by an engine. To start one takes Python more than a second.
+fn check_with_planner(name: &str, engine: &str) {
+    let Some(python) = venv::python("planners", &PLANNERS, "import unified_planning, up_aries, up_tamer")
+    else {
+        return;
+    };
+    let python = python.to_string_lossy();
+    listed::run(&format!("plans/tests/planners/{name}.esl"), |path, text| {
+        check_run(path, text, &["--allow-run"], &[engine, &python])
+    });
+}
+
+#[test]
+fn plans_of_planners_are_executed() {
+    check_with_planner("match_cellar", "aries");
+}
+
+#[test]
+fn a_broken_plan_is_made_anew_by_a_planner() {
+    check_with_planner("replanned", "tamer");
+}
+
+/// Explores a program, and compares the beginning of the verdict.
+fn check_explored(name: &str, options: &[&str], verdict: &str) {
+    let path = esl_conformance::root().join(format!("plans/tests/explored/{name}.esl"));
+    let found = process::run(eslvm(&["explore"]).args(options).arg(path), "");
+    assert!(found.output.contains(verdict), "{name}: {}{}", found.output, found.errors);
+    assert_eq!(found.status, Some(7), "{name}: a search at this grain proves nothing");
+}
+
+#[test]
+fn nothing_begins_twice_in_any_schedule_with_failures() {
+    check_explored("failures", &["--grain", "changes"], "grain ticks does; no schedule so far ends badly");
+}
+
+#[test]
+fn nothing_is_left_by_an_abort_in_any_schedule() {
+    check_explored("aborts", &["--grain", "changes"], "grain ticks does; no schedule so far ends badly");
+}
+
+#[test]
+fn nothing_is_left_in_random_schedules_with_failures_aborts_and_repairs() {
+    check_explored("three_activities", &["--random", "60"], "no random schedule ends badly");
+}
+
+#[test]
+fn the_day_of_the_spacecraft_is_repaired() {
+    let day = esl_conformance::root().join("examples/spacecraft/day.esl");
+    let found = process::run(eslvm(&["run", "--clock", "virtual"]).arg(day), "");
+    assert_eq!(found.status, Some(0), "{}{}", found.output, found.errors);
+    let is_repaired = found.output.contains("the dunes are dropped, because of burn ridge dunes");
+    assert!(
+        is_repaired && found.output.ends_with("course corrected, sent crater ridge\n"),
+        "{}",
+        found.output
+    );
+}
