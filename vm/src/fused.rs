@@ -205,6 +205,7 @@ pub(crate) fn quicken_loop(words: &mut [u32], at: usize) {
     let Some(quick) = quick else { return };
     words[at] = words[at] & !0xff | u32::from(QUICK_LOOP + quick as u8);
     if let Some(before) = at.checked_sub(1)
+        && is_instruction(words, before)
         && FUSED.iter().any(|fused| {
             u32::from(fused.number) == words[before] & 0xff
                 && fused.parts.len() == 2
@@ -213,6 +214,17 @@ pub(crate) fn quicken_loop(words: &mut [u32], at: usize) {
     {
         words[before] = original(Word(words[before])).0;
     }
+}
+
+/// Returns whether an instruction begins at a word of loaded code. The second word of one can look like
+/// another: it is any number.
+#[cfg(feature = "native")]
+fn is_instruction(words: &[u32], at: usize) -> bool {
+    let mut begin = 0;
+    while begin < at {
+        begin += original(Word(words[begin])).opcode().map_or(1, Opcode::words);
+    }
+    begin == at
 }
 
 /// Returns the word of loaded code as it was before the loader fused it with those behind it.

@@ -28,7 +28,13 @@ os.execv(sys.argv[1], sys.argv[1:])
 ";
 
 /// Name and text of each.
-const CASES: [(&str, &str); 10] = [
+const CASES: [(&str, &str); 11] = [
+    (
+        "calls whose second words look like instructions, before the end of a loop",
+        "(dotimes (i 3000) (finish-output)) (loop repeat 3000 do (finish-output *standard-output*))
+         (print (let ((s (make-string-output-stream))) (dotimes (i 3000 (length (get-output-stream-string s)))
+                  (princ i s) (finish-output s))))",
+    ),
     (
         "doubles that become something else in a loop",
         "(defun run (x y n)

@@ -4,9 +4,13 @@
 use std::collections::BTreeSet;
 
 use esl_bytecode::assembler::assemble;
+#[cfg(feature = "native")]
+use esl_bytecode::opcode::Opcode;
 use esl_bytecode::word::Word;
 
 use super::arms::{Machine, functions};
+#[cfg(feature = "native")]
+use crate::fused::quicken_loop;
 use crate::fused::{FUSED, fuse, original};
 use crate::vm::Config;
 
@@ -173,4 +177,28 @@ fn fused_instructions_take_the_ticks_of_their_parts() {
     for &slice in slices {
         assert_eq!(ticks(program, slice), ticks(&apart, slice), "slice {slice}");
     }
+}
+
+/// The second word of an instruction is any number, also that of an instruction that is fused with a loop.
+#[cfg(feature = "native")]
+#[test]
+fn a_loop_that_leads_to_machine_code_leaves_the_word_before_it_alone() {
+    let call = |number: usize| vec![Opcode::CallBuiltin as u32, number as u32];
+    let fused = |number: usize| vec![number as u32];
+    let is_fused_with_loop = |number: usize| original(Word(number as u32)).number() == Opcode::Move as u8;
+    let mut parted = 0;
+    for number in 0..1024 {
+        let mut words = call(number);
+        words.push(Opcode::Loop as u32);
+        quicken_loop(&mut words, 2);
+        assert_eq!(words[..2], call(number), "{number}");
+        assert_ne!(words[2], Opcode::Loop as u32);
+    }
+    for number in (0xC0..0x100).filter(|&number| is_fused_with_loop(number)) {
+        let mut words = fused(number);
+        words.push(Opcode::Loop as u32);
+        quicken_loop(&mut words, 1);
+        parted += usize::from(words[0] == Opcode::Move as u32);
+    }
+    assert_eq!(parted, 1, "a move and a loop");
 }
