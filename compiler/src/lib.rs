@@ -12,6 +12,8 @@ mod resolve;
 pub mod session;
 pub mod similar;
 
+pub use resolve::{children, lambda_nodes};
+
 /// The example of the README, compiled and run.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -3,6 +3,7 @@
 use esl_bytecode::compile::{Halt, NoModule, drive_with};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
+use esl_compiler::core::Core;
 use esl_compiler::cover::CountedPlace;
 use esl_compiler::diagnostic::{Sources, code};
 use esl_compiler::session::{Compiler, Texts};
@@ -39,6 +40,8 @@ pub struct Compiled {
     pub places: Vec<CountedPlace>,
     /// How often control has passed each of them in the machine in which macros run.
     pub passages: Vec<u64>,
+    /// Top-level forms of the program in the core language, if it was compiled for an analysis.
+    pub core: Vec<Core>,
 }
 
 impl Compiled {
@@ -75,6 +78,11 @@ pub fn compile_with(sources: &[Source], path: &ModulePath, modules: Modules) -> 
 /// Compiles sources and their modules to one program whose passages a machine can count.
 pub fn compile_covered(sources: &[Source], path: &ModulePath) -> Compiled {
     compile_in(Compiler::default().covered(), sources, path, Modules::Inside, Config::DEFAULT, &mut |_| {})
+}
+
+/// Compiles sources and their modules to one program, and keeps its core language for an analysis.
+pub fn compile_with_core(sources: &[Source], path: &ModulePath) -> Compiled {
+    compile_in(Compiler::default().with_core(), sources, path, Modules::Inside, Config::DEFAULT, &mut |_| {})
 }
 
 /// Compiles sources and their modules to one program with points before the uses of places that tasks may
@@ -197,7 +205,8 @@ fn compile_texts(
     };
     let program = module.map(|module| Program { module, file: None });
     let (sources, places) = (texts.sources().clone(), texts.places().to_vec());
-    Compiled { program, diagnostics, sources, stopped, places, passages }
+    let core = texts.take_core();
+    Compiled { program, diagnostics, sources, stopped, places, passages, core }
 }
 
 /// Returns the machine in which macros run. It may read the modules of `path`, and nothing else.

@@ -32,7 +32,7 @@ use esl_vm::load::LoadError;
 
 pub use compile::{
     Compiled, Instrumentation, Modules, compile, compile_covered, compile_for_run, compile_on, compile_with,
-    compile_with_points, expand,
+    compile_with_core, compile_with_points, expand,
 };
 pub use esl_vm::explore::Settings;
 pub use identity::{EXECUTION_EPOCH, ExecutionIdentity};

@@ -29,6 +29,7 @@ const SECTIONS: [(&str, &str); 12] = [
 
 /// Folders of the packages that the table of tools lists as a whole.
 const TOOLS: [&str; 13] = [
+    "analysis",
     "commands/eslc",
     "commands/eslvm",
     "commands/shared",

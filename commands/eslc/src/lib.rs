@@ -3,6 +3,7 @@
 //! A program of its own, and a part of `eslvm` where that is built with the feature `eslc`, as packages are.
 #![forbid(unsafe_code)]
 
+mod failures;
 mod format;
 mod import;
 mod new;
@@ -22,6 +23,7 @@ use esl_command::{FAILED, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain};
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_language_server::ClientExit;
 
+use failures::{FailureOptions, list_failures};
 use format::{FormatOptions, format_files};
 use import::{ImportOptions, import_tree};
 use warnings::WarningOptions;
@@ -145,6 +147,17 @@ enum EslcAction {
         #[command(flatten)]
         compiling: SourceOptions,
     },
+    /// List possible failures, the clauses that take them, and those that reach the top
+    ///
+    /// For each task and function: the causes of the failures that can leave it, where these begin, which
+    /// clauses take them and how the clauses answer. The modules that the files require are looked at too.
+    /// `(declaim (fails NAME CAUSE…))` declares the causes of a function: others are errors, declared ones that
+    /// never come are warnings. Exit status: 0 the table is printed; 2 wrong usage, or a file that cannot be
+    /// read; 3 there are errors.
+    Failures {
+        #[command(flatten)]
+        options: FailureOptions,
+    },
     /// Format files as Lisp programmers expect
     ///
     /// Blanks, indentation, lone parentheses and blank lines are put right, and lines of more than 100
@@ -219,6 +232,7 @@ pub fn main() -> ExitCode {
         EslcAction::Check { files, compiling } => check(&files, &compiling),
         EslcAction::Disasm { file, compiling } => disassemble(&file, &compiling),
         EslcAction::Format { options, modules } => Ok(format_files(&options, &modules.library)),
+        EslcAction::Failures { options } => list_failures(&options),
         EslcAction::Import { options } => Ok(import_tree(&options)),
         EslcAction::New { name } => Ok(new::new_project(&name)),
         EslcAction::Lsp { modules, .. } => serve_editor(modules.library),

@@ -199,11 +199,15 @@ pub(super) fn proclamations(
     origin: Option<OriginId>,
 ) -> Checked<Datum> {
     let mut body = Body::default();
-    for specifier in &form.args {
-        expander.declaration(specifier, &mut body, form, origin)?;
-    }
     let make = Make(form.span);
-    if body.specials.is_empty() && body.written.is_empty() {
+    let mut failures = Vec::new();
+    for specifier in &form.args {
+        match declared_failures(expander, specifier, form)? {
+            Some(declared) => failures.extend(declared),
+            None => expander.declaration(specifier, &mut body, form, origin)?,
+        }
+    }
+    if body.specials.is_empty() && body.written.is_empty() && failures.is_empty() {
         return Ok(make.nil());
     }
     let specials = body.specials.iter();
@@ -213,8 +217,46 @@ pub(super) fn proclamations(
         let to = if *is_written { make.symbol(&Symbol::cl("T")) } else { make.nil() };
         make.call_esl("%PROCLAIM-NOTINLINE", [make.quote(make.symbol(name)), to])
     });
-    let effects = specials.chain(written);
+    let effects = specials.chain(written).chain(failures);
     Ok(make.cl("EVAL-WHEN", std::iter::once(always(make)).chain(effects)))
+}
+
+/// Returns the forms that note `(fails name cause*)`: the causes of failures that may leave the function
+/// `name`, or each of several in a list. Analyses read them; a run does not.
+fn declared_failures(expander: &mut Expander, specifier: &Datum, form: &Form) -> Checked<Option<Vec<Datum>>> {
+    let items = specifier.as_list().unwrap_or_default();
+    let Some((head, rest)) = items.split_first() else { return Ok(None) };
+    if !head.as_symbol().is_some_and(|symbol| symbol.name() == "FAILS" && !symbol.is_keyword()) {
+        return Ok(None);
+    }
+    let malformed = |part: &Datum, what: &str| {
+        let what = format!("needs {what} after `fails`, not {}", quoted(part));
+        form.fault(code::MALFORMED_DECLARATION, part.span(), &what)
+    };
+    let Some((named, causes)) = rest.split_first() else {
+        return Err(malformed(specifier, "the name of a function and causes"));
+    };
+    let names = match named.as_symbol() {
+        Some(_) => vec![*named],
+        None => {
+            named.as_list().ok_or_else(|| malformed(named, "the name of a function, or a list of names"))?
+        }
+    };
+    let mut symbols = Vec::new();
+    for part in causes {
+        let cause = part.as_symbol().ok_or_else(|| malformed(part, "causes, which are symbols,"))?;
+        expander.globals.note_cause(cause, part.span());
+        symbols.push(Make(part.span()).symbol(cause));
+    }
+    let make = Make(specifier.span());
+    let mut forms = Vec::new();
+    for named in names {
+        let name = named.as_symbol().ok_or_else(|| malformed(named, "names of functions"))?;
+        let indicator = make.quote(make.symbol(&Symbol::esl("%FAILS")));
+        let causes = make.quote(make.items(symbols.iter().cloned()));
+        forms.push(make.call_esl("%PUT", [make.quote(make.symbol(name)), indicator, causes]));
+    }
+    Ok(Some(forms))
 }
 
 /// `(in-package name)`

@@ -70,7 +70,7 @@ macro_rules! visit_children {
 }
 
 /// Calls `visit` with the immediate children of a node. The nodes of a lambda are not children.
-pub(crate) fn children(kind: &NodeKind, visit: &mut dyn FnMut(NodeId)) {
+pub fn children(kind: &NodeKind, visit: &mut dyn FnMut(NodeId)) {
     visit_children!(kind, iter, |node: &NodeId| visit(*node));
 }
 
@@ -80,7 +80,7 @@ pub(crate) fn children_mut(kind: &mut NodeKind, visit: &mut dyn FnMut(&mut NodeI
 }
 
 /// Calls `visit` with the nodes of a lambda: the defaults of its parameters, then its body.
-pub(crate) fn lambda_nodes(lambda: &Lambda, visit: &mut dyn FnMut(NodeId)) {
+pub fn lambda_nodes(lambda: &Lambda, visit: &mut dyn FnMut(NodeId)) {
     lambda.optional.iter().for_each(|optional| visit(optional.default));
     lambda.keys.iter().flatten().for_each(|key| visit(key.optional.default));
     visit(lambda.body);

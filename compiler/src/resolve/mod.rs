@@ -25,7 +25,8 @@ use rustc_hash::FxHashMap;
 use crate::core::*;
 use capture::Captures;
 pub(crate) use capture::Lexical;
-pub(crate) use children::{children, children_mut, lambda_nodes};
+pub(crate) use children::children_mut;
+pub use children::{children, lambda_nodes};
 pub(crate) use inline::InlineDecision;
 
 /// Representation of a local function in the code.

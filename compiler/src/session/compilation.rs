@@ -10,6 +10,7 @@ use esl_bytecode::span::{SourceId, Span};
 use super::calls::FormCalls;
 use super::cascade::without_consequences;
 use super::queue::{FormQueue, Next, renumber_uninterned};
+use crate::core::Core;
 use crate::cover::{CountedPlace, cover};
 use crate::diagnostic::{Renderer, Sources, Stage, code};
 use crate::expand::print::print;
@@ -56,6 +57,8 @@ pub(super) struct CompilationState {
     pub(super) places: Option<Vec<CountedPlace>>,
     /// Whether points stand before uses of places that tasks may share.
     pub(super) points: bool,
+    /// Core language of the program, if it is kept.
+    pub(super) forms: Option<Vec<Core>>,
 }
 
 /// A chunk that is being lowered.
@@ -264,6 +267,9 @@ impl CompilationState {
         if let (Some(listing), true) = (&mut self.listing, purpose.emit) {
             listing.push_str(&print(&core));
             listing.push_str("\n\n");
+        }
+        if let (Some(forms), true) = (&mut self.forms, purpose.emit) {
+            forms.push(core.clone());
         }
         if let Some(places) = &mut self.places {
             cover(&mut core, &self.lines, places);

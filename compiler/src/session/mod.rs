@@ -23,6 +23,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::SourceId;
 
+use crate::core::Core;
 use crate::cover::CountedPlace;
 use crate::diagnostic::{Renderer, Sources};
 use crate::expand::Expander;
@@ -43,6 +44,8 @@ pub struct Compiler {
     covered: bool,
     /// Whether points stand before uses of places that tasks may share.
     points: bool,
+    /// Whether the core language of the program is kept.
+    core: bool,
 }
 
 impl Compiler {
@@ -69,6 +72,13 @@ impl Compiler {
     #[must_use]
     pub fn with_points(mut self) -> Compiler {
         self.points = true;
+        self
+    }
+
+    /// Keeps the core language of texts, form by form, for analyses.
+    #[must_use]
+    pub fn with_core(mut self) -> Compiler {
+        self.core = true;
         self
     }
 
@@ -120,6 +130,7 @@ impl Compiler {
             listing: None,
             places: None,
             points: self.points,
+            forms: self.core.then(Vec::new),
         }
     }
 }
@@ -169,6 +180,12 @@ impl Texts {
     /// Returns the places whose passages are counted, by their numbers.
     pub fn places(&self) -> &[CountedPlace] {
         self.0.places.as_deref().unwrap_or_default()
+    }
+
+    /// Returns the program's top-level forms in the core language, in order, those of required modules
+    /// included. Takes them out, if they are kept.
+    pub fn take_core(&mut self) -> Vec<Core> {
+        self.0.forms.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// Returns the expansion so far, form by form, if the text is compiled for the sake of that.

@@ -4,6 +4,7 @@ mod author;
 mod checking;
 mod editor;
 mod editors;
+mod failing;
 mod frames;
 mod grammar;
 mod import;

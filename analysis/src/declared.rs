@@ -1,0 +1,69 @@
+//! Declarations `(declaim (fails name cause*))`, compared with the findings of the analysis.
+
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_compiler::core::LambdaId;
+
+use crate::cause::{Applies, clause_applies};
+use crate::guard::LeavingFailures;
+use crate::table::{Maker, shown_function};
+use crate::value::{Code, NO_CONTEXT};
+
+impl Maker<'_, '_> {
+    /// Returns the declarations that do not hold: errors for failures that are not declared, warnings for
+    /// declared ones that never come.
+    pub(crate) fn findings(&self) -> Vec<Diagnostic> {
+        let forms = self.flow.forms;
+        let mut findings = Vec::new();
+        for (name, declared) in &forms.declared {
+            let leaving = match forms.defined.get(name) {
+                Some((form, node)) => self.leaving_of(*form as u32, *node),
+                None if name.name() == "MAIN" => Some(self.leaving_main()),
+                // It is one of the host, or not part of this program.
+                None => None,
+            };
+            let Some(leaving) = leaving else { continue };
+            let kinds = leaving.failures.iter().map(|failure| self.solution.failures.keys[*failure as usize]);
+            let (form, node) = declared.place;
+            let span = forms.forms[form].core.nodes[node.index()].span;
+            let shown = shown_function(name);
+            let mut is_seen = vec![false; declared.causes.len()];
+            let mut told = Vec::new();
+            for failing in kinds {
+                let mut best = Applies::No;
+                for (index, cause) in declared.causes.iter().enumerate() {
+                    let applies = clause_applies(forms, &self.flow.names, failing.kind, cause);
+                    is_seen[index] |= applies != Applies::No;
+                    best = best.max(applies);
+                }
+                let cause = self.cause(failing.kind);
+                if best != Applies::Yes && !told.contains(&cause) {
+                    let message = format!("`{shown}` may fail with {cause}, which it does not declare");
+                    let origin = forms.forms[failing.form as usize].core.nodes[failing.node.index()].span;
+                    let found = Diagnostic::new("undeclared-failure", Severity::Error, message, span);
+                    findings.push(found.also(origin, "it begins here"));
+                    told.push(cause);
+                }
+            }
+            for (cause, _) in declared.causes.iter().zip(&is_seen).filter(|(_, is_seen)| !**is_seen) {
+                let cause = cause.to_string().to_lowercase();
+                let message = format!("`{shown}` declares {cause}, but never fails with it");
+                findings.push(Diagnostic::new("declared-never", Severity::Warning, message, span));
+            }
+        }
+        findings.sort_by_key(|found| {
+            (found.primary.span.source, found.primary.span.start, found.message.clone())
+        });
+        findings
+    }
+
+    fn leaving_main(&self) -> LeavingFailures {
+        let mut main = LeavingFailures::default();
+        for form in 0..self.flow.forms.forms.len() {
+            let code = Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT };
+            if let Some(number) = self.flow.number_of(code) {
+                main.add(&self.solution.leaving[number]);
+            }
+        }
+        main
+    }
+}

@@ -1,0 +1,449 @@
+//! The flow of values: which functions, names, tasks and conditions may arrive where.
+//!
+//! Inclusion constraints in the manner of Andersen, solved while the program is discovered: a function is
+//! looked at when a call of it is found. A function that calls its own arguments is looked at anew for each
+//! place that calls it, so that the function of one caller does not leak into another (call strings of at
+//! most [`DEPTH`] calls). Sources: Shivers 1991; Andersen 1994.
+
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use esl_bytecode::symbol::Symbol;
+use esl_compiler::core::NodeId;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::effect::NodeEffect;
+use crate::forms::CoreForms;
+use crate::value::{
+    CellId, CellKey, Code, ContextId, FlowValue, NO_CONTEXT, NameId, Numbering, Spot, TaskKind, TaskWork,
+    ThingId, ThingKey, WorkId, WorkKey,
+};
+
+/// Most calls in a context.
+pub(crate) const DEPTH: usize = 3;
+/// Most pieces of code, contexts told apart, until contexts are no longer told apart.
+const MOST_CODE: usize = 20_000;
+
+/// A place that looks at the values that arrive in a cell.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum FlowWatcher {
+    /// They flow on.
+    To(CellId),
+    /// The contents of objects flow on.
+    Contents(CellId),
+    /// The first elements of objects flow on.
+    First(CellId),
+    /// Objects are lists of which only a part may arrive: any element may be the first.
+    Parts,
+    /// The contents of objects, and of the objects in there, flow on.
+    AllContents(CellId),
+    /// The values of this cell flow into objects.
+    Store(CellId),
+    /// Functions are called.
+    Call(Rc<CallPoint>),
+    /// Conditions and causes fail at this spot.
+    Fail(Spot),
+    /// Tasks' failures are failures at this spot.
+    FailAs(Spot),
+    /// Failures of all tasks together are one failure at this spot.
+    FailAll(Spot),
+    /// Handles are waited for: their values flow on.
+    ValuesOf(CellId),
+    /// The cause of conditions flows on.
+    Causes(CellId),
+    /// The cause with which tasks have ended flows on.
+    Ends(CellId),
+    /// The methods of generic functions flow on.
+    Methods(CellId),
+    /// Names of properties are achieved at this spot, for a lock.
+    Lock(Spot),
+}
+
+/// Way in which failures of a called function count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Passing {
+    /// They leave the call.
+    Through,
+    /// They end there; the form fails otherwise, or goes on.
+    Absorbed,
+    /// They end a task.
+    Task(WorkId),
+}
+
+/// Arguments of a call.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) struct CallArguments {
+    /// Each with the keyword that it is, if that is known.
+    pub(crate) given: Vec<(CellId, Option<Symbol>)>,
+    /// Lists of further ones.
+    pub(crate) lists: Vec<CellId>,
+    /// Values that may arrive in any parameter.
+    pub(crate) any: Vec<CellId>,
+}
+
+/// A call of values.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct CallPoint {
+    pub(crate) spot: Spot,
+    pub(crate) arguments: CallArguments,
+    pub(crate) result: Option<CellId>,
+    pub(crate) passing: Passing,
+    /// Whether symbols are called, too.
+    pub(crate) symbols: bool,
+}
+
+/// A cell.
+#[derive(Debug, Default)]
+struct FlowCell {
+    values: Vec<FlowValue>,
+    known: FxHashSet<FlowValue>,
+    watchers: Vec<FlowWatcher>,
+    watching: FxHashSet<FlowWatcher>,
+}
+
+/// A piece of code that may run.
+#[derive(Debug)]
+pub(crate) struct RunningCode {
+    pub(crate) code: Code,
+    /// Effects of nodes, in the order in which they were found.
+    pub(crate) effects: Vec<(NodeId, NodeEffect)>,
+}
+
+/// A value on its way.
+#[derive(Debug)]
+enum FlowStep {
+    /// To all that watches a cell.
+    Cell(CellId, FlowValue),
+    /// To a new watcher.
+    Watcher(FlowWatcher, FlowValue),
+}
+
+/// The analysis under way.
+#[derive(Debug)]
+pub(crate) struct ValueFlow<'a> {
+    pub(crate) forms: &'a CoreForms,
+    pub(crate) cell_keys: Numbering<CellKey>,
+    cells: Vec<FlowCell>,
+    pub(crate) names: Numbering<Symbol>,
+    pub(crate) things: Numbering<ThingKey>,
+    work_keys: Numbering<WorkKey>,
+    pub(crate) works: Vec<TaskWork>,
+    contexts: Numbering<(Spot, ContextId)>,
+    running_numbers: FxHashMap<Code, usize>,
+    pub(crate) running: Vec<RunningCode>,
+    seen: FxHashSet<(Spot, NodeEffect)>,
+    unread: VecDeque<usize>,
+    arrivals: VecDeque<FlowStep>,
+    /// Objects whose first elements are told apart from the others.
+    exact: FxHashSet<ThingId>,
+    /// Spots that fail with a computed cause.
+    pub(crate) computed: Vec<Spot>,
+    /// Positions of parameters that a function calls, for functions that have such.
+    pub(crate) calls_arguments: FxHashSet<(u32, u32)>,
+    /// Names of symbols that matter as values.
+    pub(crate) interesting: FxHashSet<Symbol>,
+}
+
+impl<'a> ValueFlow<'a> {
+    /// Creates an analysis that has not seen any code.
+    pub(crate) fn new(forms: &'a CoreForms) -> ValueFlow<'a> {
+        let spot = Spot { form: u32::MAX, node: NodeId(0), context: NO_CONTEXT };
+        let mut contexts = Numbering::default();
+        contexts.number(&(spot, NO_CONTEXT));
+        ValueFlow {
+            forms,
+            cell_keys: Numbering::default(),
+            cells: Vec::new(),
+            names: Numbering::default(),
+            things: Numbering::default(),
+            work_keys: Numbering::default(),
+            works: Vec::new(),
+            contexts,
+            running_numbers: FxHashMap::default(),
+            running: Vec::new(),
+            seen: FxHashSet::default(),
+            unread: VecDeque::new(),
+            arrivals: VecDeque::new(),
+            exact: FxHashSet::default(),
+            computed: Vec::new(),
+            calls_arguments: crate::hot::calling_their_arguments(forms),
+            interesting: forms
+                .defined
+                .keys()
+                .chain(&forms.noted)
+                .chain(forms.parents.keys())
+                .cloned()
+                .collect(),
+        }
+    }
+
+    /// Returns the cell of a key.
+    pub(crate) fn cell(&mut self, key: CellKey) -> CellId {
+        let (number, is_new) = self.cell_keys.number(&key);
+        if is_new {
+            self.cells.push(FlowCell::default());
+        }
+        CellId(number)
+    }
+
+    /// Returns the cell of the value of a node.
+    pub(crate) fn at(&mut self, spot: Spot) -> CellId {
+        self.cell(CellKey::Node(spot))
+    }
+
+    /// Returns the number of a symbol.
+    pub(crate) fn name(&mut self, symbol: &Symbol) -> NameId {
+        NameId(self.names.number(symbol).0)
+    }
+
+    /// Returns the symbol with a number.
+    pub(crate) fn symbol(&self, name: NameId) -> &Symbol {
+        &self.names.keys[name.index()]
+    }
+
+    /// Returns an object.
+    pub(crate) fn thing(&mut self, key: ThingKey) -> ThingId {
+        ThingId(self.things.number(&key).0)
+    }
+
+    /// Returns the cell of the contents of an object that `spot` makes, and puts the object at `to`.
+    pub(crate) fn make(&mut self, spot: Spot, part: u8, to: CellId) -> CellId {
+        let thing = self.thing(ThingKey::Made(spot, part));
+        self.add(to, FlowValue::Thing(thing));
+        self.cell(CellKey::Contents(thing))
+    }
+
+    /// Returns the cells of the first element and of the contents of a list that `spot` makes, and puts the
+    /// list at `to`.
+    pub(crate) fn make_exact(&mut self, spot: Spot, part: u8, to: CellId) -> (CellId, CellId) {
+        let thing = self.thing(ThingKey::Made(spot, part));
+        self.exact.insert(thing);
+        self.add(to, FlowValue::Thing(thing));
+        let (first, contents) = (self.cell(CellKey::First(thing)), self.cell(CellKey::Contents(thing)));
+        self.copy(first, contents);
+        (first, contents)
+    }
+
+    /// Returns a cell beside that of the value of a spot.
+    pub(crate) fn beside(&mut self, spot: Spot) -> CellId {
+        let thing = self.thing(ThingKey::Made(spot, u8::MAX - 2));
+        self.cell(CellKey::Contents(thing))
+    }
+
+    /// Returns a task or an operation.
+    pub(crate) fn work(&mut self, key: WorkKey, kind: TaskKind) -> WorkId {
+        let (number, is_new) = self.work_keys.number(&key);
+        if is_new {
+            self.works.push(TaskWork { key, kind, is_awaited: false });
+        }
+        WorkId(number)
+    }
+
+    /// Adds a value to a cell.
+    pub(crate) fn add(&mut self, cell: CellId, value: FlowValue) {
+        let place = &mut self.cells[cell.index()];
+        if place.known.insert(value) {
+            place.values.push(value);
+            self.arrivals.push_back(FlowStep::Cell(cell, value));
+        }
+    }
+
+    /// Has the values of a cell flow to another one.
+    pub(crate) fn copy(&mut self, from: CellId, to: CellId) {
+        if from != to {
+            self.watch(from, FlowWatcher::To(to));
+        }
+    }
+
+    /// Has the values of a cell, and those that come, looked at.
+    pub(crate) fn watch(&mut self, cell: CellId, watcher: FlowWatcher) {
+        let place = &mut self.cells[cell.index()];
+        if !place.watching.insert(watcher.clone()) {
+            return;
+        }
+        place.watchers.push(watcher.clone());
+        // Those on their way arrive in the new watcher too, which does no harm.
+        let values = place.values.iter();
+        self.arrivals.extend(values.map(|value| FlowStep::Watcher(watcher.clone(), *value)));
+    }
+
+    /// Notes an effect of a node.
+    pub(crate) fn note(&mut self, spot: Spot, effect: NodeEffect) {
+        if self.seen.insert((spot, effect)) {
+            let form = &self.forms.forms[spot.form as usize];
+            let owner = form.owners[spot.node.index()];
+            let running = self.run(Code { form: spot.form, lambda: owner, context: spot.context });
+            self.running[running].effects.push((spot.node, effect));
+        }
+    }
+
+    /// Returns the number of a piece of code, which is looked at if it is new.
+    pub(crate) fn run(&mut self, code: Code) -> usize {
+        if let Some(number) = self.running_numbers.get(&code) {
+            return *number;
+        }
+        let number = self.running.len();
+        self.running_numbers.insert(code, number);
+        self.running.push(RunningCode { code, effects: Vec::new() });
+        self.unread.push_back(number);
+        number
+    }
+
+    /// Returns the number of a piece of code that has been found.
+    pub(crate) fn number_of(&self, code: Code) -> Option<usize> {
+        self.running_numbers.get(&code).copied()
+    }
+
+    /// Returns the context in which a function runs that `spot` calls.
+    pub(crate) fn context_for(&mut self, code: Code, spot: Spot) -> ContextId {
+        if !self.calls_arguments.contains(&(code.form, code.lambda.0)) {
+            return code.context;
+        }
+        if self.running.len() > MOST_CODE {
+            return NO_CONTEXT;
+        }
+        let bare = Spot { context: NO_CONTEXT, ..spot };
+        // A call that is in the context already is a recursion.
+        let mut row = Vec::new();
+        let mut context = spot.context;
+        while context != NO_CONTEXT {
+            let (called, outer) = self.contexts.keys[context.0 as usize];
+            if called == bare {
+                return context;
+            }
+            row.push(called);
+            context = outer;
+        }
+        row.insert(0, bare);
+        row.truncate(DEPTH);
+        let mut result = NO_CONTEXT;
+        for called in row.into_iter().rev() {
+            result = ContextId(self.contexts.number(&(called, result)).0);
+        }
+        result
+    }
+
+    /// Looks at all code and all values until there are no new ones.
+    pub(crate) fn solve(&mut self) {
+        loop {
+            if let Some(number) = self.unread.pop_front() {
+                let code = self.running[number].code;
+                self.read(code);
+                continue;
+            }
+            match self.arrivals.pop_front() {
+                Some(FlowStep::Cell(cell, value)) => {
+                    for index in 0..self.cells[cell.index()].watchers.len() {
+                        let watcher = self.cells[cell.index()].watchers[index].clone();
+                        self.arrive(&watcher, value);
+                    }
+                }
+                Some(FlowStep::Watcher(watcher, value)) => self.arrive(&watcher, value),
+                None => return,
+            }
+        }
+    }
+
+    /// Does as a watcher says with a value.
+    fn arrive(&mut self, watcher: &FlowWatcher, value: FlowValue) {
+        match watcher {
+            FlowWatcher::To(to) => self.add(*to, value),
+            FlowWatcher::Contents(to) => {
+                if let FlowValue::Thing(thing) = value {
+                    let contents = self.cell(CellKey::Contents(thing));
+                    self.copy(contents, *to);
+                }
+            }
+            FlowWatcher::First(to) => {
+                if let FlowValue::Thing(thing) = value {
+                    let first = self.cell(CellKey::First(thing));
+                    self.copy(first, *to);
+                    if !self.exact.contains(&thing) {
+                        let contents = self.cell(CellKey::Contents(thing));
+                        self.copy(contents, first);
+                    }
+                }
+            }
+            FlowWatcher::Parts => {
+                if let FlowValue::Thing(thing) = value {
+                    let (first, contents) =
+                        (self.cell(CellKey::First(thing)), self.cell(CellKey::Contents(thing)));
+                    self.copy(contents, first);
+                }
+            }
+            FlowWatcher::AllContents(to) => {
+                if let FlowValue::Thing(thing) = value {
+                    let contents = self.cell(CellKey::Contents(thing));
+                    self.copy(contents, *to);
+                    self.watch(contents, FlowWatcher::AllContents(*to));
+                }
+            }
+            FlowWatcher::Store(from) => {
+                if let FlowValue::Thing(thing) = value {
+                    let (first, contents) =
+                        (self.cell(CellKey::First(thing)), self.cell(CellKey::Contents(thing)));
+                    self.copy(*from, contents);
+                    self.copy(*from, first);
+                }
+            }
+            FlowWatcher::Call(point) => self.call_value(point, value),
+            FlowWatcher::Fail(spot) => self.fail_with(*spot, value),
+            FlowWatcher::FailAs(spot) => {
+                if let FlowValue::Work(work) = value {
+                    self.works[work.index()].is_awaited = true;
+                    self.note(*spot, NodeEffect::FailAs(work));
+                }
+            }
+            FlowWatcher::FailAll(spot) => {
+                if let FlowValue::Work(work) = value {
+                    self.works[work.index()].is_awaited = true;
+                    self.note(*spot, NodeEffect::FailAll(work));
+                }
+            }
+            FlowWatcher::ValuesOf(to) => {
+                if let FlowValue::Work(work) = value {
+                    let body = self.cell(CellKey::Body(work));
+                    self.watch(body, FlowWatcher::ValuesOf(*to));
+                } else if let FlowValue::Closure(code) = value {
+                    let result = self.cell(CellKey::Return(code));
+                    self.copy(result, *to);
+                }
+            }
+            FlowWatcher::Causes(to) => match value {
+                FlowValue::Caught(_)
+                | FlowValue::EndOf(_)
+                | FlowValue::Condition(_)
+                | FlowValue::AnySymbol => self.add(*to, value),
+                _ => {}
+            },
+            FlowWatcher::Ends(to) => {
+                if let FlowValue::Work(work) = value {
+                    self.works[work.index()].is_awaited = true;
+                    self.add(*to, FlowValue::EndOf(work));
+                    let body = self.cell(CellKey::Body(work));
+                    self.watch(body, FlowWatcher::ValuesOf(*to));
+                }
+            }
+            FlowWatcher::Methods(to) => {
+                if let FlowValue::Generic(name) = value {
+                    let methods = self.cell(CellKey::Methods(self.symbol(name).clone()));
+                    self.copy(methods, *to);
+                }
+            }
+            FlowWatcher::Lock(spot) => self.lock(*spot, value),
+        }
+    }
+}
+
+impl ValueFlow<'_> {
+    /// Returns whether a failure is known to begin at a spot.
+    pub(crate) fn fails_at(&self, spot: Spot) -> bool {
+        let form = &self.forms.forms[spot.form as usize];
+        let code = Code { form: spot.form, lambda: form.owners[spot.node.index()], context: spot.context };
+        let Some(number) = self.number_of(code) else { return true };
+        self.running[number].effects.iter().any(|(node, effect)| {
+            *node == spot.node
+                && matches!(effect, NodeEffect::Fail(_) | NodeEffect::FailAs(_) | NodeEffect::Again(_))
+        })
+    }
+}

@@ -1,0 +1,165 @@
+//! Handling forms: which failures of a body end in which clause, and which leave the form.
+
+use std::collections::BTreeSet;
+
+use esl_bytecode::datum::Datum;
+
+use crate::cause::{Applies, clause_applies, is_of_type, mistakes_named, mistakes_of_type};
+use crate::clause::{Clause, ClauseLimit};
+use crate::effect::FailureKind;
+use crate::forms::CoreForms;
+use crate::value::Numbering;
+use esl_bytecode::symbol::Symbol;
+
+/// A failure: its number among the failures of the program.
+pub(crate) type FailureId = u32;
+
+/// Failures and programming errors that may leave a piece of code.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct LeavingFailures {
+    pub(crate) failures: BTreeSet<FailureId>,
+    pub(crate) mistakes: u8,
+}
+
+impl LeavingFailures {
+    /// Adds those of another. Returns whether that has added any.
+    pub(crate) fn add(&mut self, other: &LeavingFailures) -> bool {
+        let before = (self.failures.len(), self.mistakes);
+        self.failures.extend(&other.failures);
+        self.mistakes |= other.mistakes;
+        before != (self.failures.len(), self.mistakes)
+    }
+
+    /// Whether it is empty.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.failures.is_empty() && self.mistakes == 0
+    }
+}
+
+/// Knowledge of a program's failures.
+pub(crate) struct FailureFacts<'k> {
+    pub(crate) forms: &'k CoreForms,
+    pub(crate) names: &'k Numbering<Symbol>,
+    /// Kinds of the failures, by their numbers.
+    pub(crate) kinds: &'k [FailureKind],
+}
+
+/// Result of a handling form.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Handled {
+    /// Failures that leave the form.
+    pub(crate) leaving: LeavingFailures,
+    /// Failures that each clause takes; for each, whether it may also go on outward.
+    pub(crate) taken: Vec<BTreeSet<(FailureId, bool)>>,
+    /// Programming errors that each clause takes.
+    pub(crate) mistakes: Vec<u8>,
+}
+
+/// Returns the result of a recovery form. `effects` are those of the clauses, `resumes` says whether control
+/// can reach their ends.
+pub(crate) fn recover(
+    known: &FailureFacts<'_>,
+    body: &LeavingFailures,
+    clauses: &[Clause],
+    effects: &[LeavingFailures],
+    resumes: &[bool],
+) -> Handled {
+    let count = clauses.len();
+    let mut handled = Handled {
+        leaving: LeavingFailures::default(),
+        taken: vec![BTreeSet::new(); count],
+        mistakes: vec![0; count],
+    };
+    let applies = |failure: FailureId, clause: usize| {
+        clause_applies(known.forms, known.names, known.kinds[failure as usize], &clauses[clause].cause)
+    };
+    // A clause that runs inside another one may have spent its retries.
+    let triggers = |from: usize, to: usize| {
+        effects[from].failures.iter().any(|failure| applies(*failure, to) != Applies::No)
+    };
+    let passes_on = |clause: usize, from: Option<usize>| {
+        let may_be_spent = match from {
+            None => clauses[clause].ways.retries || resumes[clause],
+            Some(from) => {
+                from == clause || triggers(clause, from) || clauses[clause].ways.retries || resumes[clause]
+            }
+        };
+        clauses[clause].limit != ClauseLimit::None && may_be_spent
+    };
+    let mut done = vec![false; count];
+    let mut sources: Vec<(Option<usize>, &LeavingFailures)> = vec![(None, body)];
+    while let Some((from, source)) = sources.pop() {
+        for failure in &source.failures {
+            let mut goes_on = true;
+            for clause in 0..count {
+                if !goes_on || clauses[clause].limit == ClauseLimit::Times(0) {
+                    continue;
+                }
+                let match_ = applies(*failure, clause);
+                if match_ == Applies::No {
+                    continue;
+                }
+                goes_on = match_ == Applies::Perhaps || passes_on(clause, from);
+                handled.taken[clause].insert((*failure, goes_on));
+            }
+            if goes_on {
+                handled.leaving.failures.insert(*failure);
+            }
+        }
+        let mut left = source.mistakes;
+        for clause in 0..count {
+            let (all, some) = mistakes_named(clauses[clause].cause.name());
+            handled.mistakes[clause] |= left & some;
+            if !passes_on(clause, from) && clauses[clause].limit != ClauseLimit::Times(0) {
+                left &= !all;
+            }
+        }
+        handled.leaving.mistakes |= left;
+        for clause in 0..count {
+            // A limit of the run may come at any place.
+            let is_wide = matches!(
+                clauses[clause].cause.name(),
+                "GENERAL-FAILURE" | "STACK-EXHAUSTED" | "HEAP-EXHAUSTED" | "STORAGE-CONDITION"
+            );
+            let is_reached = is_wide || !handled.taken[clause].is_empty() || handled.mistakes[clause] != 0;
+            if is_reached && !done[clause] {
+                done[clause] = true;
+                sources.push((Some(clause), &effects[clause]));
+            }
+        }
+    }
+    handled
+}
+
+/// Returns the result of a form that unwinds to a clause for a type of conditions.
+pub(crate) fn take(known: &FailureFacts<'_>, body: &LeavingFailures, types: &[Datum]) -> Handled {
+    let count = types.len();
+    let mut handled = Handled {
+        leaving: LeavingFailures::default(),
+        taken: vec![BTreeSet::new(); count],
+        mistakes: vec![0; count],
+    };
+    for failure in &body.failures {
+        let mut goes_on = true;
+        for (index, wanted) in types.iter().enumerate() {
+            if goes_on {
+                let match_ = is_of_type(known.forms, known.names, known.kinds[*failure as usize], wanted);
+                if match_ != Applies::No {
+                    goes_on = match_ == Applies::Perhaps;
+                    handled.taken[index].insert((*failure, goes_on));
+                }
+            }
+        }
+        if goes_on {
+            handled.leaving.failures.insert(*failure);
+        }
+    }
+    let mut left = body.mistakes;
+    for (index, wanted) in types.iter().enumerate() {
+        let (all, some) = mistakes_of_type(wanted);
+        handled.mistakes[index] |= left & some;
+        left &= !all;
+    }
+    handled.leaving.mistakes = left;
+    handled
+}

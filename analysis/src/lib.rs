@@ -1,0 +1,99 @@
+//! The possible failures of a program: the causes of failures that can leave each function and each task,
+//! where they begin, which clauses take them and how these answer.
+//!
+//! The analysis works on the core language of a whole program with its modules, which the compiler keeps on
+//! request. It needs no annotation. Two passes: `flow` finds which functions may be called where, `solve`
+//! which failures leave which code, form and task. Functions of the library are known by tables
+//! (`library`); functions of the host by declarations, `(declaim (fails name cause*))`.
+//!
+//! Guarantees: a failure that leaves a task in a run is in the table, apart from the cases that the chapter
+//! "Possible failures" of the manual lists. Not here: reading files, printing.
+#![forbid(unsafe_code)]
+
+mod call;
+mod cause;
+mod clause;
+mod declared;
+mod effect;
+mod evaluate;
+mod explain;
+mod flow;
+mod forms;
+mod guard;
+mod hot;
+mod library;
+mod solve;
+mod table;
+mod taken;
+mod value;
+
+pub mod render;
+
+use esl_bytecode::compile::MODULE_SOURCES;
+use esl_compiler::core::{Core, LambdaId};
+use esl_compiler::diagnostic::Sources;
+
+use effect::{FailureKind, NodeEffect, Reason};
+use flow::ValueFlow;
+use forms::CoreForms;
+use table::Maker;
+use value::{Code, NO_CONTEXT};
+
+pub use table::{CauseRow, ClauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow};
+pub use value::TaskKind;
+
+/// Options of an analysis.
+#[derive(Clone, Debug, Default)]
+pub struct AnalysisOptions {
+    /// Whether programming errors are listed.
+    pub all: bool,
+    /// Cause whose ways are explained.
+    pub explained: Option<String>,
+}
+
+/// Returns the causes that functions of the library begin by themselves, in upper case.
+pub fn causes_of_the_library() -> impl Iterator<Item = &'static str> {
+    library::all_causes()
+}
+
+/// Analyses a program: its top-level forms, and the sources that their places refer to. Returns the table,
+/// and the explanation of a cause if one was asked for.
+pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -> (FailureTable, String) {
+    let forms = CoreForms::new(cores);
+    let mut flow = ValueFlow::new(&forms);
+    for form in 0..forms.forms.len() {
+        flow.run(Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT });
+    }
+    flow.solve();
+    add_uncalled(&mut flow, sources);
+    flow.solve();
+    // Computed causes without a known value.
+    for spot in std::mem::take(&mut flow.computed) {
+        if !flow.fails_at(spot) {
+            flow.note(spot, NodeEffect::Fail(FailureKind::Any(Reason::Computed)));
+        }
+    }
+    let solution = solve::solve(&flow);
+    let maker = Maker { flow: &flow, solution: &solution, sources, all: options.all };
+    let explanation = options.explained.as_ref().map(|cause| maker.explain(cause)).unwrap_or_default();
+    (maker.table(), explanation)
+}
+
+/// Looks at the program's own functions without a call, and at those that call their arguments, apart
+/// from any call.
+fn add_uncalled(flow: &mut ValueFlow<'_>, sources: &Sources) {
+    let forms = flow.forms;
+    let mut defined: Vec<_> = forms.defined.values().copied().collect();
+    defined.sort_unstable();
+    for (form, node) in defined {
+        let span = forms.forms[form].core.nodes[node.index()].span;
+        if sources.name(span.source).is_some_and(|name| name.starts_with(MODULE_SOURCES)) {
+            continue;
+        }
+        let esl_compiler::core::NodeKind::Call(_, arguments) = forms.forms[form].kind(node) else { continue };
+        let Some(function) = arguments.get(1) else { continue };
+        if let esl_compiler::core::NodeKind::Lambda(lambda) = forms.forms[form].kind(*function) {
+            flow.run(Code { form: form as u32, lambda: *lambda, context: NO_CONTEXT });
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! The table as text for people, and as JSON, CSV, Markdown and HTML.
+
+mod flat;
+mod fmea;
+mod json;
+mod text;
+
+use crate::table::FailureTable;
+
+/// Form of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableFormat {
+    /// Text for people.
+    Text,
+    /// One object.
+    Json,
+    /// A line for each failure of an item.
+    Csv,
+    /// Tables of Markdown.
+    Markdown,
+    /// A page.
+    Html,
+}
+
+/// Returns the table in a form.
+pub fn render(table: &FailureTable, format: TableFormat) -> String {
+    match format {
+        TableFormat::Text => text::render(table),
+        TableFormat::Json => json::render(table),
+        TableFormat::Csv => flat::csv(&flat::rows(table)),
+        TableFormat::Markdown => flat::markdown(&flat::rows(table)),
+        TableFormat::Html => flat::html("Possible failures", &flat::rows(table)),
+    }
+}
+
+/// Returns the failure modes and effects of a program as a table; as text, that is Markdown. `earlier` is
+/// such a table in CSV, whose severities and notes are carried over.
+pub fn render_fmea(table: &FailureTable, format: TableFormat, earlier: Option<&str>) -> String {
+    let lines = fmea::lines(table, earlier);
+    match format {
+        TableFormat::Csv => flat::csv(&lines),
+        TableFormat::Html => flat::html("Failure modes and effects", &lines),
+        TableFormat::Json => json::lines(&lines),
+        TableFormat::Text | TableFormat::Markdown => flat::markdown(&lines),
+    }
+}

@@ -1,0 +1,334 @@
+//! The fixed point of effects: the failures that may leave each piece of code, each task and each clause.
+
+use esl_bytecode::builtin::Builtin;
+use esl_bytecode::symbol::Symbol;
+use esl_compiler::core::{Callee, NodeId, NodeKind};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::cause::{Applies, clause_applies};
+use crate::clause::can_end;
+use crate::effect::{FailureKind, NodeEffect, mistake};
+use crate::flow::ValueFlow;
+use crate::forms::{CoreForm, CoreForms, ScopeKind};
+use crate::guard::{FailureFacts, FailureId, Handled, LeavingFailures, recover, take};
+use crate::value::{Code, Numbering, Spot, WorkId, WorkKey};
+
+/// A failure of the program: its kind, and the form and node where it begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Failing {
+    pub(crate) kind: FailureKind,
+    pub(crate) form: u32,
+    pub(crate) node: NodeId,
+}
+
+/// Most rounds until the sets no longer change.
+const MOST_ROUNDS: usize = 500;
+
+/// The result of the analysis of effects.
+#[derive(Debug, Default)]
+pub(crate) struct Solution {
+    /// All failures.
+    pub(crate) failures: Numbering<Failing>,
+    pub(crate) kinds: Vec<FailureKind>,
+    /// Failures that leave each piece of code.
+    pub(crate) leaving: Vec<LeavingFailures>,
+    /// Failures that leave each clause of a lambda that runs clauses.
+    pub(crate) of_clauses: FxHashMap<(usize, usize), LeavingFailures>,
+    /// Failures that end each task.
+    pub(crate) of_works: Vec<LeavingFailures>,
+    /// Whether a handling form has caught further failures in this round.
+    has_caught: bool,
+    /// Failures that handling forms catch.
+    caught: FxHashMap<Spot, LeavingFailures>,
+    /// Results of handling forms, by the piece of code and the scope.
+    pub(crate) handled: FxHashMap<(usize, usize), Handled>,
+    /// Clauses whose ends control can reach, by form, node of the recovery form, and position.
+    pub(crate) resuming: FxHashSet<(u32, NodeId, usize)>,
+}
+
+/// Finds the failures of all code that the flow has found.
+pub(crate) fn solve(flow: &ValueFlow<'_>) -> Solution {
+    let mut solution = Solution {
+        leaving: vec![LeavingFailures::default(); flow.running.len()],
+        of_works: vec![LeavingFailures::default(); flow.works.len()],
+        resuming: resuming_clauses(flow.forms),
+        ..Solution::default()
+    };
+    let bodies = bodies_of_works(flow);
+    for _ in 0..MOST_ROUNDS {
+        let mut has_changed = false;
+        for number in (0..flow.running.len()).rev() {
+            has_changed |= solution.look_at(flow, number);
+        }
+        for (index, codes) in bodies.iter().enumerate() {
+            has_changed |= solution.end_work(flow, WorkId(index as u32), codes);
+        }
+        has_changed |= std::mem::take(&mut solution.has_caught);
+        if !has_changed {
+            break;
+        }
+    }
+    solution
+}
+
+/// Returns the code that each task or operation runs.
+pub(crate) fn bodies_of_works(flow: &ValueFlow<'_>) -> Vec<Vec<Code>> {
+    let mut bodies = vec![Vec::new(); flow.works.len()];
+    for running in &flow.running {
+        for (_, effect) in &running.effects {
+            if let NodeEffect::Body(work, code) = effect {
+                let row: &mut Vec<Code> = &mut bodies[work.index()];
+                if !row.contains(code) {
+                    row.push(*code);
+                }
+            }
+        }
+    }
+    bodies
+}
+
+impl Solution {
+    fn failure(&mut self, kind: FailureKind, form: u32, node: NodeId) -> FailureId {
+        let (number, is_new) = self.failures.number(&Failing { kind, form, node });
+        if is_new {
+            self.kinds.push(kind);
+        }
+        number
+    }
+
+    /// Finds the failures that end a task. Returns whether some are new.
+    fn end_work(&mut self, flow: &ValueFlow<'_>, work: WorkId, codes: &[Code]) -> bool {
+        let mut all = LeavingFailures::default();
+        for code in codes {
+            if let Some(number) = flow.number_of(*code) {
+                all.add(&self.leaving[number]);
+            }
+        }
+        self.of_works[work.index()].add(&all)
+    }
+
+    /// Finds the failures that leave a piece of code. Returns whether some are new.
+    fn look_at(&mut self, flow: &ValueFlow<'_>, number: usize) -> bool {
+        let running = &flow.running[number];
+        let code = running.code;
+        let form = &flow.forms.forms[code.form as usize];
+        let mut result = LeavingFailures::default();
+        let mut scopes: FxHashMap<usize, LeavingFailures> = FxHashMap::default();
+        for (node, effect) in &running.effects {
+            let leaving = self.effect(flow, code, *node, *effect);
+            match form.scope_of[node.index()] {
+                Some(scope) => _ = scopes.entry(scope).or_default().add(&leaving),
+                None => _ = result.add(&leaving),
+            }
+        }
+        let mut has_changed = false;
+        // Those around others come first.
+        for scope in (0..form.scopes.len()).rev() {
+            let is_here = scopes.contains_key(&scope) || self.is_in(form, scope, code);
+            if !is_here {
+                continue;
+            }
+            let inside = scopes.remove(&scope).unwrap_or_default();
+            let out = match &form.scopes[scope].kind {
+                ScopeKind::ClauseBody(position) => {
+                    let known = self.of_clauses.entry((number, *position)).or_default();
+                    has_changed |= known.add(&inside);
+                    continue;
+                }
+                kind => self.handle(flow, code, number, scope, kind, &inside),
+            };
+            match form.scopes[scope].parent {
+                Some(parent) => _ = scopes.entry(parent).or_default().add(&out),
+                None => _ = result.add(&out),
+            }
+        }
+        has_changed | self.leaving[number].add(&result)
+    }
+
+    /// Whether a scope is one of the lambda of a piece of code.
+    fn is_in(&self, form: &CoreForm, scope: usize, code: Code) -> bool {
+        let node = match &form.scopes[scope].kind {
+            ScopeKind::Recovery { node, .. }
+            | ScopeKind::Cases { node, .. }
+            | ScopeKind::Handlers { node, .. } => *node,
+            ScopeKind::ClauseBody(_) => return false,
+        };
+        form.owners[node.index()] == code.lambda
+    }
+
+    /// Returns the failures that leave a handling form.
+    fn handle(
+        &mut self,
+        flow: &ValueFlow<'_>,
+        code: Code,
+        number: usize,
+        scope: usize,
+        kind: &ScopeKind,
+        inside: &LeavingFailures,
+    ) -> LeavingFailures {
+        let known = FailureFacts { forms: flow.forms, names: &flow.names, kinds: &self.kinds };
+        let spot = |node: NodeId| Spot { form: code.form, node, context: code.context };
+        let (handled, guard) = match kind {
+            ScopeKind::Recovery { node, clauses, procedures } => {
+                let runner = flow.number_of(Code { lambda: *procedures, ..code });
+                let of = |position| runner.and_then(|number| self.of_clauses.get(&(number, position)));
+                let effects: Vec<LeavingFailures> =
+                    (0..clauses.len()).map(|one| of(one).cloned().unwrap_or_default()).collect();
+                let resumes: Vec<bool> =
+                    (0..clauses.len()).map(|one| self.resuming.contains(&(code.form, *node, one))).collect();
+                (recover(&known, inside, clauses, &effects, &resumes), None)
+            }
+            ScopeKind::Cases { node, types } => (take(&known, inside, types), Some(spot(*node))),
+            ScopeKind::Handlers { node, types } => {
+                let handled = take(&known, inside, types);
+                // All handlers see the signalled condition.
+                let mut all = LeavingFailures::default();
+                all.add(inside);
+                let is_new = self.caught.entry(spot(*node)).or_default().add(&all);
+                self.has_caught |= is_new;
+                (handled, None)
+            }
+            ScopeKind::ClauseBody(_) => return inside.clone(),
+        };
+        if let Some(guard) = guard {
+            let caught = self.caught.entry(guard).or_default();
+            let all = LeavingFailures {
+                failures: handled.taken.iter().flatten().map(|(failure, _)| *failure).collect(),
+                mistakes: handled.mistakes.iter().fold(0, |all, one| all | one),
+            };
+            self.has_caught |= caught.add(&all);
+        }
+        let leaving = handled.leaving.clone();
+        self.handled.insert((number, scope), handled);
+        leaving
+    }
+
+    /// Returns the failures that an effect of a node brings there.
+    fn effect(
+        &mut self,
+        flow: &ValueFlow<'_>,
+        code: Code,
+        node: NodeId,
+        effect: NodeEffect,
+    ) -> LeavingFailures {
+        let mut leaving = LeavingFailures::default();
+        match effect {
+            NodeEffect::Call(called) => {
+                if let Some(number) = flow.number_of(called) {
+                    return self.leaving[number].clone();
+                }
+            }
+            NodeEffect::Absorb(_) | NodeEffect::Start(_) | NodeEffect::Body(..) | NodeEffect::FailAll(_) => {}
+            NodeEffect::Limit(work, cause) => {
+                let failure = self.failure(FailureKind::Cause(cause), code.form, node);
+                self.of_works[work.index()].failures.insert(failure);
+            }
+            NodeEffect::Fail(kind) => {
+                let failure = self.failure(kind, code.form, node);
+                leaving.failures.insert(failure);
+            }
+            NodeEffect::FailAs(work) => {
+                leaving = self.of_works[work.index()].clone();
+                if let WorkKey::Host(name) = flow.works[work.index()].key {
+                    for kind in kinds_of_host(flow, name) {
+                        let failure = self.failure(kind, code.form, node);
+                        leaving.failures.insert(failure);
+                    }
+                }
+            }
+            NodeEffect::FailAllWith(cause) => {
+                let number = flow.number_of(code).unwrap_or_default();
+                let all = flow.running[number].effects.iter().filter(|(other, _)| *other == node);
+                let tasks: Vec<WorkId> = all
+                    .filter_map(|(_, effect)| match effect {
+                        NodeEffect::FailAll(work) => Some(*work),
+                        _ => None,
+                    })
+                    .collect();
+                let fails = |work: &WorkId| !self.of_works[work.index()].failures.is_empty();
+                if flow.forms.aborts || tasks.iter().all(fails) {
+                    let failure = self.failure(FailureKind::Cause(cause), code.form, node);
+                    leaving.failures.insert(failure);
+                } else if tasks.iter().all(|work| !self.of_works[work.index()].is_empty()) {
+                    leaving.mistakes = mistake::CONSEQUENCE;
+                }
+            }
+            NodeEffect::Again(guard) => return self.caught.get(&guard).cloned().unwrap_or_default(),
+            NodeEffect::Mistake(kinds) => leaving.mistakes = kinds,
+        }
+        leaving
+    }
+}
+
+/// Returns the kinds of failure of an operation of the host.
+fn kinds_of_host(flow: &ValueFlow<'_>, name: crate::value::NameId) -> Vec<FailureKind> {
+    let declared = flow.forms.declared.get(flow.symbol(name));
+    let known = |symbol: &Symbol| flow.names.keys.iter().position(|known| known == symbol);
+    match declared {
+        Some(declared) => {
+            let names = declared.causes.iter().filter_map(known);
+            names.map(|index| FailureKind::Below(crate::value::NameId(index as u32))).collect()
+        }
+        None => vec![FailureKind::Unknown(name)],
+    }
+}
+
+/// Returns the cause with which a node fails for sure, or an empty text if it fails with some condition.
+fn failing_call(form: &CoreForm, node: NodeId) -> Option<String> {
+    let (NodeKind::Call(callee, arguments) | NodeKind::Apply(callee, arguments)) = form.kind(node) else {
+        return None;
+    };
+    let name = match callee {
+        Callee::Global(symbol) => symbol.name(),
+        Callee::Builtin(Builtin::Exit) => return Some("".into()),
+        Callee::Builtin(builtin) => builtin.info().name,
+        _ => return None,
+    };
+    match name {
+        "%FAIL-FOR" | "FAIL" => Some(
+            arguments
+                .first()
+                .and_then(|node| form.symbol(*node))
+                .map_or(String::new(), |one| one.name().into()),
+        ),
+        "ERROR" | "%FAIL-WITH" | "%FAIL-AS" | "%FAIL-ALL" | "%NO-CASE" => Some(String::new()),
+        _ => None,
+    }
+}
+
+/// Returns the clauses whose ends control can reach, so that the failed call gets their value. A failure
+/// inside a clause comes back only if another clause for it can end.
+fn resuming_clauses(forms: &CoreForms) -> FxHashSet<(u32, NodeId, usize)> {
+    let mut found: FxHashSet<(u32, NodeId, usize)> = FxHashSet::default();
+    let mut causes: Vec<Symbol> = Vec::new();
+    loop {
+        let before = found.len();
+        for (number, form) in forms.forms.iter().enumerate() {
+            let comes_back = |cause: &str| {
+                let is_it = |known: &Symbol| {
+                    let mut names = Numbering::default();
+                    let kind =
+                        FailureKind::Cause(crate::value::NameId(names.number(&Symbol::keyword(cause)).0));
+                    clause_applies(forms, &names, kind, known) != Applies::No
+                };
+                if cause.is_empty() { !causes.is_empty() } else { causes.iter().any(is_it) }
+            };
+            let mut more = Vec::new();
+            for scope in &form.scopes {
+                let ScopeKind::Recovery { node, clauses, .. } = &scope.kind else { continue };
+                for (position, clause) in clauses.iter().enumerate() {
+                    let key = (number as u32, *node, position);
+                    let leaves = |node| failing_call(form, node).is_some_and(|cause| !comes_back(&cause));
+                    if !found.contains(&key) && can_end(&form.core, clause.body, &leaves) {
+                        found.insert(key);
+                        more.push(clause.cause.clone());
+                    }
+                }
+            }
+            causes.extend(more);
+        }
+        if found.len() == before {
+            return found;
+        }
+    }
+}

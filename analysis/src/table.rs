@@ -1,0 +1,460 @@
+//! The table: which failures leave each function and each task, and which clauses take which.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use esl_bytecode::compile::MODULE_SOURCES;
+use esl_bytecode::symbol::symbol_of_setf_cell;
+use esl_compiler::core::{LambdaId, NodeId, NodeKind};
+use esl_compiler::diagnostic::Sources;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::cause::{MISTAKES, cause_of_condition};
+use crate::effect::{FailureKind, NodeEffect, Reason};
+use crate::flow::ValueFlow;
+use crate::forms::ScopeKind;
+use crate::guard::{FailureId, LeavingFailures};
+use crate::solve::{Solution, bodies_of_works};
+use crate::value::{Code, NO_CONTEXT, TaskKind, WorkKey};
+
+/// A place of a program.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct CodePlace {
+    /// Name of the source.
+    pub source: String,
+    /// Line, from 1; 0 if it is unknown.
+    pub line: u32,
+    /// Column, from 1.
+    pub column: u32,
+}
+
+impl std::fmt::Display for CodePlace {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}:{}:{}", self.source, self.line, self.column)
+    }
+}
+
+/// A place where a failure begins, and the function there.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct FailureOrigin {
+    /// Place.
+    pub place: CodePlace,
+    /// Function, mock or task around it.
+    pub function: String,
+}
+
+/// A cause of failures, and where they begin.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CauseRow {
+    /// The cause, such as `:timeout`; `any` if it is not known, `unknown` for a function that is not known.
+    pub cause: String,
+    /// Places where the failures begin, in order.
+    pub origins: Vec<FailureOrigin>,
+    /// Clauses that have taken some of these failures before they went on outward.
+    pub spent: Vec<CodePlace>,
+    /// Whether it is a programming error.
+    pub is_mistake: bool,
+}
+
+/// A function of the program.
+#[derive(Clone, Debug)]
+pub struct FunctionRow {
+    /// Name in lower case.
+    pub name: String,
+    /// Place of the definition.
+    pub place: CodePlace,
+    /// Causes that may leave it.
+    pub causes: Vec<CauseRow>,
+    /// Whether it also fails as functions fail that it is given.
+    pub fails_as_arguments: bool,
+}
+
+/// A task of the program.
+#[derive(Clone, Debug)]
+pub struct FailingTask {
+    /// Name in lower case.
+    pub name: String,
+    /// Kind.
+    pub kind: TaskKind,
+    /// Place of the form that begins it; unknown for the main task.
+    pub place: CodePlace,
+    /// Causes that end it.
+    pub causes: Vec<CauseRow>,
+    /// Whether a form waits for it, and takes its failure.
+    pub is_awaited: bool,
+    /// Clauses in code that it runs, as indices of the rows of clauses.
+    pub clauses: Vec<usize>,
+}
+
+/// A clause that takes failures.
+#[derive(Clone, Debug)]
+pub struct ClauseRow {
+    /// Place of the clause, or of its form.
+    pub place: CodePlace,
+    /// Function around it.
+    pub function: String,
+    /// The cause or the type for which it is written.
+    pub wanted: String,
+    /// Its answer, in words.
+    pub answer: String,
+    /// Failures that it takes.
+    pub causes: Vec<CauseRow>,
+    /// Failures that may leave the clause itself.
+    pub fails: Vec<CauseRow>,
+}
+
+/// The failures of a program.
+#[derive(Clone, Debug, Default)]
+pub struct FailureTable {
+    /// Functions, in the order of the text.
+    pub functions: Vec<FunctionRow>,
+    /// Tasks, the main one first.
+    pub tasks: Vec<FailingTask>,
+    /// Clauses, in the order of the text.
+    pub clauses: Vec<ClauseRow>,
+    /// Declarations that do not hold.
+    pub findings: Vec<esl_bytecode::diagnostic::Diagnostic>,
+}
+
+/// The maker of the table.
+pub(crate) struct Maker<'m, 'f> {
+    pub(crate) flow: &'m ValueFlow<'f>,
+    pub(crate) solution: &'m Solution,
+    pub(crate) sources: &'m Sources,
+    /// Whether programming errors are listed.
+    pub(crate) all: bool,
+}
+
+impl Maker<'_, '_> {
+    /// Returns the place of a node.
+    pub(crate) fn place(&self, form: u32, node: NodeId) -> CodePlace {
+        let span = self.flow.forms.forms[form as usize].core.nodes[node.index()].span;
+        self.place_of(span)
+    }
+
+    /// Returns the place of the first part of a node that has a place of its own; a macro's parts have that
+    /// of the call.
+    pub(crate) fn place_inside(&self, form: u32, node: NodeId) -> CodePlace {
+        let text = &self.flow.forms.forms[form as usize];
+        let whole = text.core.nodes[node.index()].span;
+        let mut best: Option<esl_bytecode::span::Span> = None;
+        let mut pending = vec![node];
+        while let Some(node) = pending.pop() {
+            let span = text.core.nodes[node.index()].span;
+            let is_better = best.is_none_or(|best| (span.start, best.end) < (best.start, span.end));
+            if whole.contains(span) && span != whole && span.end > span.start && is_better {
+                best = Some(span);
+            }
+            esl_compiler::children(text.kind(node), &mut |child| pending.push(child));
+            if let NodeKind::Lambda(lambda) = text.kind(node) {
+                pending.push(text.core.lambdas[lambda.index()].body);
+            }
+        }
+        self.place_of(best.unwrap_or(whole))
+    }
+
+    fn place_of(&self, span: esl_bytecode::span::Span) -> CodePlace {
+        let source = self.sources.name(span.source).unwrap_or_default().to_string();
+        match self.sources.place(span) {
+            Some(place) => CodePlace { source, line: place.line as u32, column: place.column as u32 },
+            None => CodePlace { source, line: 0, column: 0 },
+        }
+    }
+
+    /// Returns the name of the function around a lambda.
+    pub(crate) fn function_around(&self, form: u32, lambda: LambdaId) -> String {
+        let core = &self.flow.forms.forms[form as usize].core;
+        let mut current = Some(lambda);
+        let mut inner: Option<String> = None;
+        while let Some(lambda) = current {
+            let text = &core.lambdas[lambda.index()];
+            if let Some(name) = &text.name {
+                let shown = name.to_string().to_lowercase();
+                if name.as_symbol().is_some() || shown.starts_with("(setf") {
+                    return shown;
+                }
+                if inner.is_none() && is_telling(&shown) {
+                    inner = Some(shown);
+                }
+            }
+            current = text.parent;
+        }
+        inner.unwrap_or_else(|| "the top level".into())
+    }
+
+    /// Returns the text of a cause.
+    pub(crate) fn cause(&self, kind: FailureKind) -> String {
+        match kind {
+            FailureKind::Cause(name) => self.flow.symbol(name).to_string().to_lowercase(),
+            FailureKind::Below(name) => {
+                let symbol = self.flow.symbol(name);
+                let has_kinds = self.flow.forms.parents.values().any(|parents| parents.contains(symbol));
+                let kinds = if has_kinds { " (or a kind of it)" } else { "" };
+                format!("{}{kinds}", symbol.to_string().to_lowercase())
+            }
+            FailureKind::Condition(name) => cause_of_condition(self.flow.symbol(name)),
+            FailureKind::Any(Reason::Computed) => "any (a computed cause)".into(),
+            FailureKind::Any(Reason::Code) => "any (code that is made at run time)".into(),
+            FailureKind::Unknown(name) => {
+                format!("unknown ({} declares no failures)", shown_function(self.flow.symbol(name)))
+            }
+        }
+    }
+
+    /// Returns rows of failures, by their causes.
+    pub(crate) fn rows(&self, failures: impl IntoIterator<Item = FailureId>, mistakes: u8) -> Vec<CauseRow> {
+        let mut by_cause: BTreeMap<String, (BTreeSet<FailureOrigin>, BTreeSet<CodePlace>)> = BTreeMap::new();
+        for failure in failures {
+            let failing = self.solution.failures.keys[failure as usize];
+            let form = &self.flow.forms.forms[failing.form as usize];
+            let function = self.function_around(failing.form, form.owners[failing.node.index()]);
+            let origin = FailureOrigin { place: self.place(failing.form, failing.node), function };
+            by_cause.entry(self.cause(failing.kind)).or_default().0.insert(origin);
+        }
+        let row =
+            |(cause, (origins, spent)): (String, (BTreeSet<FailureOrigin>, BTreeSet<CodePlace>))| CauseRow {
+                cause,
+                origins: origins.into_iter().collect(),
+                spent: spent.into_iter().collect(),
+                is_mistake: false,
+            };
+        let mut rows: Vec<CauseRow> = by_cause.into_iter().map(row).collect();
+        if self.all {
+            let kinds = MISTAKES.iter().filter(|(kind, _)| mistakes & kind != 0);
+            rows.extend(kinds.map(|(_, cause)| CauseRow {
+                cause: (*cause).to_string(),
+                origins: Vec::new(),
+                spent: Vec::new(),
+                is_mistake: true,
+            }));
+        }
+        rows
+    }
+
+    pub(crate) fn rows_of(&self, leaving: &LeavingFailures) -> Vec<CauseRow> {
+        self.rows(leaving.failures.iter().copied(), leaving.mistakes)
+    }
+
+    /// Whether a source is one of the program's own, not of a module that comes with the system.
+    pub(crate) fn is_own(&self, source: &str) -> bool {
+        !source.starts_with(MODULE_SOURCES)
+    }
+
+    /// Makes the table.
+    pub(crate) fn table(&self) -> FailureTable {
+        let clauses = self.clauses();
+        let by_scope: FxHashMap<(u32, usize, usize), usize> =
+            clauses.iter().enumerate().map(|(index, (key, _))| (*key, index)).collect();
+        FailureTable {
+            functions: self.functions(),
+            tasks: self.tasks(&by_scope),
+            clauses: clauses.into_iter().map(|(_, row)| row).collect(),
+            findings: self.findings(),
+        }
+    }
+
+    fn functions(&self) -> Vec<FunctionRow> {
+        let mut rows = Vec::new();
+        for (name, (form, node)) in &self.flow.forms.defined {
+            let place = self.place(*form as u32, *node);
+            if !self.is_own(&place.source) {
+                continue;
+            }
+            let Some(leaving) = self.leaving_of(*form as u32, *node) else { continue };
+            let lambda = self.lambda_defined(*form, *node);
+            let fails_as_arguments =
+                lambda.is_some_and(|lambda| self.flow.calls_arguments.contains(&(*form as u32, lambda.0)));
+            let causes = self.rows_of(&leaving);
+            rows.push(FunctionRow { name: shown_function(name), place, causes, fails_as_arguments });
+        }
+        rows.sort_by(|left, right| (&left.place, &left.name).cmp(&(&right.place, &right.name)));
+        rows
+    }
+
+    pub(crate) fn lambda_defined(&self, form: usize, node: NodeId) -> Option<LambdaId> {
+        let form = &self.flow.forms.forms[form];
+        let NodeKind::Call(_, arguments) = form.kind(node) else { return None };
+        match form.kind(*arguments.get(1)?) {
+            NodeKind::Lambda(lambda) => Some(*lambda),
+            _ => None,
+        }
+    }
+
+    /// Returns the failures of the function that a node defines.
+    pub(crate) fn leaving_of(&self, form: u32, node: NodeId) -> Option<LeavingFailures> {
+        let lambda = self.lambda_defined(form as usize, node)?;
+        // A function that calls its arguments is shown as it is by itself.
+        let bare = Code { form, lambda, context: NO_CONTEXT };
+        if self.flow.calls_arguments.contains(&(form, lambda.0))
+            && let Some(number) = self.flow.number_of(bare)
+        {
+            return Some(self.solution.leaving[number].clone());
+        }
+        let mut all = LeavingFailures::default();
+        let mut is_found = false;
+        for (number, running) in self.flow.running.iter().enumerate() {
+            if running.code.form == form && running.code.lambda == lambda {
+                is_found = true;
+                all.add(&self.solution.leaving[number]);
+            }
+        }
+        is_found.then_some(all)
+    }
+
+    /// Returns the code that a task runs, calls included.
+    fn reach(&self, codes: Vec<Code>) -> FxHashSet<usize> {
+        let mut found = FxHashSet::default();
+        let mut pending = codes;
+        while let Some(code) = pending.pop() {
+            let Some(number) = self.flow.number_of(code) else { continue };
+            if !found.insert(number) {
+                continue;
+            }
+            for (_, effect) in &self.flow.running[number].effects {
+                if let NodeEffect::Call(called) | NodeEffect::Absorb(called) = effect {
+                    pending.push(*called);
+                }
+            }
+            let form = &self.flow.forms.forms[code.form as usize];
+            for scope in &form.scopes {
+                if let ScopeKind::Recovery { node, procedures, .. } = &scope.kind
+                    && form.owners[node.index()] == code.lambda
+                {
+                    pending.push(Code { lambda: *procedures, ..code });
+                }
+            }
+        }
+        found
+    }
+
+    fn tasks(&self, by_scope: &FxHashMap<(u32, usize, usize), usize>) -> Vec<FailingTask> {
+        let bodies = bodies_of_works(self.flow);
+        let clauses_of = |codes: Vec<Code>| {
+            let mut rows: BTreeSet<usize> = BTreeSet::new();
+            for number in self.reach(codes) {
+                let code = self.flow.running[number].code;
+                let form = &self.flow.forms.forms[code.form as usize];
+                for scope in 0..form.scopes.len() {
+                    let found = (0..64).map_while(|position| by_scope.get(&(code.form, scope, position)));
+                    if self.solution.handled.contains_key(&(number, scope)) {
+                        rows.extend(found);
+                    }
+                }
+            }
+            rows.into_iter().collect::<Vec<usize>>()
+        };
+        let tops: Vec<Code> = (0..self.flow.forms.forms.len())
+            .map(|form| Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT })
+            .collect();
+        let mut main = LeavingFailures::default();
+        for code in &tops {
+            if let Some(number) = self.flow.number_of(*code) {
+                main.add(&self.solution.leaving[number]);
+            }
+        }
+        let mut rows = vec![FailingTask {
+            name: "main".into(),
+            kind: TaskKind::Main,
+            place: CodePlace::default(),
+            causes: self.rows_of(&main),
+            is_awaited: false,
+            clauses: clauses_of(tops),
+        }];
+        let mut groups: BTreeMap<(CodePlace, String), (LeavingFailures, Vec<Code>, TaskKind, bool)> =
+            BTreeMap::new();
+        for (index, work) in self.flow.works.iter().enumerate() {
+            let (place, name) = match work.key {
+                WorkKey::Begun(spot, _) => {
+                    let place = self.place(spot.form, spot.node);
+                    let name = self.given_name(spot.form, spot.node);
+                    (place, name.unwrap_or_else(|| self.name_of_task(&bodies[index], work.kind)))
+                }
+                WorkKey::Scripted(name) => {
+                    (CodePlace::default(), format!("scripted {}", shown_function(self.flow.symbol(name))))
+                }
+                WorkKey::Host(_) => continue,
+            };
+            if !self.is_own(&place.source) || bodies[index].is_empty() {
+                continue;
+            }
+            let group = groups.entry((place, name)).or_insert((
+                LeavingFailures::default(),
+                Vec::new(),
+                work.kind,
+                work.is_awaited,
+            ));
+            group.0.add(&self.solution.of_works[index]);
+            group.1.extend(&bodies[index]);
+            group.3 |= work.is_awaited;
+        }
+        rows.extend(groups.into_iter().map(|((place, name), (leaving, codes, kind, is_awaited))| {
+            FailingTask {
+                name,
+                kind,
+                place,
+                causes: self.rows_of(&leaving),
+                is_awaited,
+                clauses: clauses_of(codes),
+            }
+        }));
+        rows
+    }
+
+    /// Returns the name that the options of a `spawn` give to the task.
+    fn given_name(&self, form: u32, node: NodeId) -> Option<String> {
+        let text = &self.flow.forms.forms[form as usize];
+        let around = text.core.nodes[node.index()].span;
+        text.core.nodes.iter().find_map(|node| {
+            let NodeKind::Call(_, items) = &node.kind else { return None };
+            let is_name = |item: &NodeId| {
+                text.symbol(*item).is_some_and(|key| key.is_keyword() && key.name() == "NAME")
+            };
+            let position = items.iter().position(is_name)?;
+            let NodeKind::Constant(name) = text.kind(*items.get(position + 1)?) else { return None };
+            around.contains(text.core.nodes[items[position].index()].span).then(|| {
+                let shown = name.to_string().to_lowercase();
+                shown.trim_matches('"').to_string()
+            })
+        })
+    }
+
+    fn name_of_task(&self, bodies: &[Code], kind: TaskKind) -> String {
+        let mut names: BTreeSet<String> = BTreeSet::new();
+        for code in bodies {
+            let lambda = &self.flow.forms.forms[code.form as usize].core.lambdas[code.lambda.index()];
+            if let Some(name) = &lambda.name {
+                let mut parts = name.elements();
+                let shown = match (parts.next(), parts.next()) {
+                    (Some(_), Some(second)) => second.to_string(),
+                    _ => name.to_string(),
+                };
+                names.insert(shown.to_lowercase());
+            }
+        }
+        let word = match kind {
+            TaskKind::Guard => return "guard".into(),
+            TaskKind::Spawned if names.iter().any(|name| name == "(spawn)") => return "spawned".into(),
+            TaskKind::Mock => "mock ",
+            TaskKind::World => "world ",
+            TaskKind::Test => "test ",
+            _ => "",
+        };
+        if names.len() == 1 {
+            format!("{word}{}", names.first().map_or("", |name| name))
+        } else {
+            format!("{word}task")
+        }
+    }
+}
+
+/// Whether the name of a lambda tells more than its form.
+fn is_telling(name: &str) -> bool {
+    ["(mock", "(task", "(test", "(to-achieve", "(with-world"].iter().any(|start| name.starts_with(start))
+}
+
+/// Returns the name of a function in lower case.
+pub(crate) fn shown_function(symbol: &esl_bytecode::symbol::Symbol) -> String {
+    match symbol_of_setf_cell(symbol) {
+        Some(named) => format!("(setf {})", named.name().to_lowercase()),
+        None => symbol.name().to_lowercase(),
+    }
+}

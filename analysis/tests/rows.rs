@@ -1,0 +1,229 @@
+//! Rows of small programs: the causes that leave functions and tasks, as the semantics of the language has
+//! it.
+
+use esl::program::{Source, compile_with_core};
+use esl_analysis::{AnalysisOptions, CauseRow, FailureTable, analyze};
+
+fn table(text: &str) -> FailureTable {
+    let mut compiled =
+        compile_with_core(&[Source::new("a.esl", text)], &esl::module_path::ModulePath::none());
+    assert!(!compiled.has_errors(), "{text}: {:?}", compiled.diagnostics);
+    analyze(std::mem::take(&mut compiled.core), &compiled.sources, &AnalysisOptions::default()).0
+}
+
+fn shown(rows: &[CauseRow]) -> String {
+    rows.iter().map(|row| row.cause.as_str()).collect::<Vec<_>>().join(" ")
+}
+
+/// Checks the causes that leave the function `f`.
+fn check(text: &str, expected: &str) {
+    let table = table(text);
+    let row = table.functions.iter().find(|row| row.name == "f").expect("it defines the function");
+    assert_eq!(shown(&row.causes), expected, "{text}");
+}
+
+#[test]
+fn clauses_take_failures_for_good_if_they_leave() {
+    let clause = |clause: &str| {
+        format!(
+            "(defun work () (fail :a))
+             (defun f () (with-recovery-procedures (({clause})) (work)))"
+        )
+    };
+    check("(defun f () (fail :a))", ":a");
+    check(&clause(":a (abort 1)"), "");
+    check(&clause(":b (abort 1)"), ":a");
+    check(&clause(":general-failure (abort 1)"), "");
+    // These may be in vain.
+    check(&clause(":a :retries 3 (retry)"), ":a");
+    check(&clause(":a :retries :infinite (retry)"), "");
+    check(&clause(":a (values 1)"), ":a");
+    check(&clause(":a :retries :infinite (values 1)"), "");
+    check(&clause(":a (fail :b)"), ":b");
+    check(&clause(":a (if (zerop (random 2)) (retry) (abort 1))"), ":a");
+    check(&clause("(:a &rest arguments) (print arguments) (abort nil)"), "");
+    check(&clause(":a :retries 0 (abort 1)"), ":a");
+}
+
+#[test]
+fn clauses_of_one_form_call_each_other() {
+    // The example of the paper, which ends with the cause :FOO.
+    check(
+        "(defun f () (with-recovery-procedures ((:foo (fail :baz)) (:baz (fail :foo))) (fail :foo)))",
+        ":baz :foo",
+    );
+    check("(defun f () (with-recovery-procedures ((:foo (fail :baz)) (:baz (abort))) (fail :foo)))", "");
+}
+
+#[test]
+fn a_failing_clause_comes_back_if_an_outer_one_resumes() {
+    let inner = "(with-recovery-procedures ((:a (fail :b))) (list (fail :a) (fail :a)))";
+    check(&format!("(defun f () {inner})"), ":b");
+    check(
+        &format!("(defun f () (with-recovery-procedures ((:b :retries :infinite (values 1))) {inner}))"),
+        ":a",
+    );
+}
+
+#[test]
+fn causes_have_a_hierarchy() {
+    let causes = "(define-cause :top ()) (define-cause :low (:top))";
+    check(&format!("{causes} (defun f () (with-recovery-procedures ((:top (abort))) (fail :low)))"), "");
+    check(&format!("{causes} (defun f () (with-recovery-procedures ((:low (abort))) (fail :top)))"), ":top");
+    check("(define-condition slip (error) ()) (defun f () (ignore-errors (error 'slip)))", "");
+    check("(define-condition slip (error) ()) (defun f () (error 'slip))", ":slip");
+    check("(defun f () (with-recovery-procedures ((:error (abort))) (error \"no\")))", "");
+}
+
+#[test]
+fn handlers_take_types() {
+    check("(defun f () (handler-case (fail :a) (failure () 1)))", "");
+    check("(defun f () (handler-case (fail :a) (error () 1)))", ":a");
+    check("(defun f () (ignore-errors (fail :a) (error \"no\")))", ":a");
+    check("(defun f () (handler-case (fail :a) (failure (one) (error one))))", ":a");
+    check("(defun f () (handler-case (fail :a) (failure (one) (fail (failure-cause one)))))", ":a");
+    check(
+        "(defun f () (block nil (handler-bind ((failure (lambda (one) (print one) (return 1)))) (fail :a))))",
+        "",
+    );
+    check("(defun f () (handler-bind ((failure #'print)) (fail :a)))", ":a");
+    check("(defun f () (unwind-protect (fail :a) (fail :b)))", ":a :b");
+    check("(defun f () (with-cleanup-procedure (fail :b) (fail :a)))", ":a :b");
+}
+
+#[test]
+fn functions_are_followed_as_values() {
+    check("(defun f () (mapcar (lambda (x) (if x (fail :a) 1)) '(1 2)))", ":a");
+    check("(defun bad (x) (fail :a x)) (defun f () (mapcar #'bad '(1 2)) (mapc 'bad '(1)))", ":a");
+    check(
+        "(defun bad () (fail :a)) (defun f () (let ((all (list #'bad #'car))) (funcall (first all))))",
+        ":a",
+    );
+    check(
+        "(defstruct part act) (defun bad () (fail :a))
+         (defun f () (let ((one (make-part :act #'bad))) (funcall (part-act one))))",
+        ":a",
+    );
+    check(
+        "(defvar *acts* (make-hash-table)) (setf (gethash 1 *acts*) (lambda () (fail :a)))
+         (defun f () (funcall (gethash 1 *acts*)))",
+        ":a",
+    );
+    check("(defun f () (let ((causes '(:a :b))) (fail (nth (random 2) causes))))", ":a :b");
+    check("(defun f (cause) (fail cause))", "any (a computed cause)");
+    check("(defun f () (labels ((go-on (n) (if (> n 3) (fail :a) (go-on (+ n 1))))) (go-on 0)))", ":a");
+    check(
+        "(defgeneric act (x)) (defmethod act ((x integer)) (fail :a)) (defmethod act ((x string)) (fail :b))
+         (defun f (x) (act x))",
+        ":a :b",
+    );
+}
+
+#[test]
+fn a_function_of_one_caller_does_not_leak_into_another() {
+    let helper = "(defun twice (function) (funcall function) (funcall function))
+                  (defun outer (function) (twice (lambda () (funcall function))))";
+    check(
+        &format!("{helper} (defun g () (outer (lambda () (fail :g)))) (defun f () (outer (lambda () 1)))"),
+        "",
+    );
+    check(
+        &format!(
+            "{helper} (defun g () (outer (lambda () (fail :g)))) (defun f () (outer (lambda () (fail :f))))"
+        ),
+        ":f",
+    );
+}
+
+#[test]
+fn forms_of_tasks_fail_as_their_tasks() {
+    check("(defun f () (task-net (a (fail :a)) (b (fail :b))))", ":a :b");
+    check("(defun f () (task-net :allow-failures (a (fail :a))))", "");
+    check("(defun f () (or-parallel (a (fail :a)) (b (fail :b))))", ":all-failed");
+    check("(defun f () (or-parallel (a (fail :a)) (b (sleep 1))))", "");
+    check("(defun f () (try-in-order (a (fail :a)) (b (fail :b))))", ":all-failed");
+    check("(defun f () (pursue (a (fail :a)) (b (sleep 1))))", ":a");
+    check("(defun f () (supervise (:restarts 3) (a (fail :a))))", ":restarts-exhausted");
+    check("(defun f () (spawn (fail :a)))", "");
+    check("(defun f () (with-guardian (sleep 1) (fail :a) (sleep 2)))", ":a");
+    let spawned = table("(spawn (:name 'scout) (fail :a))");
+    let scout = spawned.tasks.iter().find(|task| task.name == "scout").expect("there is such a task");
+    assert_eq!(shown(&scout.causes), ":a");
+    assert!(spawned.tasks[0].causes.is_empty(), "the main task goes on");
+}
+
+#[test]
+fn forms_of_the_library_have_causes_of_their_own() {
+    check("(defun f () (with-timeout 3 (sleep 4)))", ":timeout");
+    check("(defun f () (with-budget 100 (sleep 4)))", ":budget-exhausted");
+    check("(defun f () (with-quota (:tasks 1) (sleep 4)))", ":quota-exhausted");
+    check("(defvar *e* (make-event)) (defun f () (wait-for-event *e*))", "");
+    check("(defvar *e* (make-event)) (defun f () (wait-for-event *e* :timeout 3))", ":timeout");
+    check("(define-fluent *x* 1) (defun f () (wait-until (> *x* 2)))", "");
+    check("(define-fluent *x* 1) (defun f () (wait-until (> *x* 2) :timeout 3))", ":timeout");
+    check(
+        "(defun f () (with-query-bindings '(a ?x) (print #?x) (next-bindings)))",
+        ":no-bindings :no-more-bindings",
+    );
+    check("(define-resource arm) (defun f () (with-resource (arm :if-denied :fail) 1))", ":resource-denied");
+    check(
+        "(defvar *on* nil) (defun on-p () *on*) (to-achieve (on-p) (t (fail :a))) (defun f () (achieve (on-p)))",
+        ":a :condition-not-achieved",
+    );
+    check(
+        "(defvar *on* nil) (defun on-p () *on*) (to-achieve (on-p) (*on* (setq *on* t))) (defun f () (achieve (on-p)))",
+        ":condition-not-achieved :no-applicable-method",
+    );
+}
+
+#[test]
+fn operations_fail_as_their_mocks_and_declarations() {
+    check("(define-mock slew (to) (sleep 1) (fail :stuck to)) (defun f () (slew 1))", ":stuck");
+    check(
+        "(define-mock slew (to) (fail :stuck to)) (defun f () (operation-result (start (slew 1))))",
+        ":cancelled :stuck",
+    );
+    check("(declaim (fails slew :stuck)) (defun f () (slew 1))", ":stuck");
+    check("(defun f () (slew 1))", "unknown (slew declares no failures)");
+    check(
+        "(define-mock slew (to) to) (defun f () (with-world ((:answer (slew *) :failing (:stuck 1))) (slew 1)))",
+        ":stuck",
+    );
+}
+
+#[test]
+fn declarations_are_checked_in_both_directions() {
+    let findings = |text: &str| {
+        let found = table(text).findings;
+        found.iter().map(|found| format!("{} {}", found.code, found.message)).collect::<Vec<_>>()
+    };
+    assert!(findings("(declaim (fails f :a)) (defun f () (fail :a))").is_empty());
+    assert_eq!(
+        findings("(declaim (fails f :a)) (defun f () (fail :b))"),
+        [
+            "declared-never `f` declares :a, but never fails with it",
+            "undeclared-failure `f` may fail with :b, which it does not declare"
+        ]
+    );
+    assert_eq!(
+        findings("(declaim (fails main)) (defun f () (fail :b)) (f)"),
+        ["undeclared-failure `main` may fail with :b, which it does not declare"]
+    );
+    assert!(
+        findings("(declaim (fails main)) (defun f () (fail :b)) (ignore-errors (print (f)) (fail :c))").len()
+            == 2
+    );
+}
+
+#[test]
+fn without_a_clause_its_failures_go_outward() {
+    let mission = |clauses: &str| {
+        format!(
+            "(defun turn () (fail :stuck)) (defun look () (fail :dark))
+             (defun f () (with-recovery-procedures ({clauses}) (turn) (look)))"
+        )
+    };
+    check(&mission("(:stuck (abort)) (:dark (abort))"), "");
+    check(&mission("(:stuck (abort))"), ":dark");
+    check(&mission("(:dark (abort))"), ":stuck");
+}

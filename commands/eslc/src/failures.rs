@@ -1,0 +1,96 @@
+//! `eslc failures`: the possible failures of a program, the clauses that take them, the ones that reach the
+//! top.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use esl::program;
+use esl_analysis::render::{TableFormat, render, render_fmea};
+use esl_analysis::{AnalysisOptions, analyze};
+use esl_bytecode::diagnostic::Severity;
+use esl_command as command;
+use esl_command::{NOT_COMPILED, SUCCESS, USAGE};
+
+use crate::{SourceOptions, print, print_diagnostics, read};
+
+/// Options of `eslc failures`.
+#[derive(Args)]
+pub(crate) struct FailureOptions {
+    /// Source files, which are looked at as one program; `-` is standard input
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Form of the table
+    #[arg(long, value_enum, default_value_t = TableForm::Text)]
+    format: TableForm,
+    /// Show the ways of one cause, such as `:timeout`, instead of the table
+    #[arg(long, value_name = "CAUSE")]
+    explain: Option<String>,
+    /// Print the failure modes and effects, one line for each cause and function in which it begins
+    #[arg(long, conflicts_with = "explain")]
+    fmea: bool,
+    /// File with an earlier table of `--fmea --format csv`, whose severities and notes are carried over
+    #[arg(long, value_name = "FILE", requires = "fmea")]
+    notes: Option<PathBuf>,
+    /// List programming errors too, such as values of a wrong type
+    #[arg(long)]
+    all: bool,
+    #[command(flatten)]
+    compiling: SourceOptions,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum TableForm {
+    /// Text for people
+    Text,
+    /// One object of JSON
+    Json,
+    /// Comma-separated values
+    Csv,
+    /// Tables of Markdown
+    Md,
+    /// A page of HTML
+    Html,
+}
+
+/// Analyses files and prints the table. Declarations that do not hold are errors.
+pub(crate) fn list_failures(options: &FailureOptions) -> Result<u8, u8> {
+    let sources = read(&options.files)?;
+    let compiling = &options.compiling;
+    compiling.warnings.check()?;
+    let line = || "looking for failures".to_string();
+    let mut compiled = command::StatusLine::new(compiling.style.quiet)
+        .during(line, || program::compile_with_core(&sources, &compiling.path(&options.files)));
+    compiling.warnings.apply(&mut compiled);
+    let cores = std::mem::take(&mut compiled.core);
+    if compiled.has_errors() {
+        print_diagnostics(&compiled, &compiling.style);
+        return Err(NOT_COMPILED);
+    }
+    let wanted = AnalysisOptions { all: options.all, explained: options.explain.clone() };
+    let (table, explanation) = analyze(cores, &compiled.sources, &wanted);
+    let has_failed = table.findings.iter().any(|found| found.severity == Severity::Error);
+    // Warnings of the compiler are those of `eslc check`.
+    compiled.diagnostics = table.findings.clone();
+    print_diagnostics(&compiled, &compiling.style);
+    let format = match options.format {
+        TableForm::Text => TableFormat::Text,
+        TableForm::Json => TableFormat::Json,
+        TableForm::Csv => TableFormat::Csv,
+        TableForm::Md => TableFormat::Markdown,
+        TableForm::Html => TableFormat::Html,
+    };
+    let earlier = match &options.notes {
+        Some(file) => Some(std::fs::read_to_string(file).map_err(|error| {
+            command::complain(format_args!("{} cannot be read: {error}", file.display()));
+            USAGE
+        })?),
+        None => None,
+    };
+    let text = match (&options.explain, options.fmea) {
+        (Some(_), _) => explanation,
+        (None, true) => render_fmea(&table, format, earlier.as_deref()),
+        (None, false) => render(&table, format),
+    };
+    print(&text)?;
+    Ok(if has_failed { NOT_COMPILED } else { SUCCESS })
+}

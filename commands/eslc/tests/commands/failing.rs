@@ -1,0 +1,87 @@
+//! `eslc failures`: tables, the ways of a cause, declarations that do not hold, failure modes and effects.
+
+use esl_conformance::folder::Folder;
+use esl_conformance::process;
+
+use crate::eslc;
+
+const MISSION: &str = "(declaim (fails drive :stuck :late))
+(defun drive (metres)
+  (when (> metres 3) (fail :stuck metres))
+  (when (< metres 0) (fail :lost)))
+(deftest drives (check-failure :stuck (drive 5)))
+(with-recovery-procedures ((:stuck (abort))) (drive 2))
+";
+
+/// Runs `eslc` in a folder. Returns its status, its output and its errors.
+fn run(folder: &Folder, arguments: &[&str]) -> (Option<i32>, String, String) {
+    let finished = process::run(eslc(arguments).current_dir(folder.path()), "");
+    (finished.status, finished.output, finished.errors)
+}
+
+#[test]
+fn possible_failures_are_listed() {
+    let folder = Folder::with("failing", &[("mission.esl", MISSION)]);
+    let (status, output, errors) = run(&folder, &["failures", "mission.esl"]);
+    assert_eq!(status, Some(3), "{errors}");
+    assert!(errors.contains("error[undeclared-failure]: `drive` may fail with :lost"), "{errors}");
+    assert!(errors.contains("warning[declared-never]: `drive` declares :late"), "{errors}");
+    assert!(
+        output.starts_with("task main: a failure ends the run\n  ends by\n    :lost  from drive"),
+        "{output}"
+    );
+    for (options, said) in [
+        (&["--explain", ":stuck"][..], "taken by the clause for :stuck at mission.esl:6:"),
+        (&["--all"], ":type-error"),
+        (&["--format", "json"], "\"cause\": \":lost\""),
+        (&["--format", "csv"], "kind,item,place,cause,begins in,then\r\ntask,main,,:lost,"),
+        (&["--format", "md"], "| task | main |  | :lost | drive (mission.esl:4) | ends the run |"),
+        (&["--format", "html"], "<td>:lost</td>"),
+        (&["--fmea", "--format", "csv"], "drive,:lost,mission.esl:4,leaves drive,none,none,ends the run"),
+    ] {
+        let (_, output, errors) = run(&folder, &[&["failures"], options, &["mission.esl"]].concat());
+        assert!(output.contains(said), "{options:?}: {output}{errors}");
+    }
+}
+
+#[test]
+fn severities_and_notes_are_carried_over() {
+    let notes = "item,failure mode,severity,notes\ndrive,:lost,1,look at it\ndrive,:gone,2,old\n";
+    let folder = Folder::with("failing-notes", &[("mission.esl", MISSION), ("notes.csv", notes)]);
+    let arguments = ["failures", "--fmea", "--format", "csv", "--notes", "notes.csv", "mission.esl"];
+    let (_, output, errors) = run(&folder, &arguments);
+    assert!(output.contains(",1,look at it\r\n"), "{output}{errors}");
+    assert!(output.contains("drive,:gone,,,,,,,2,stale: no longer in the program; old\r\n"), "{output}");
+}
+
+#[test]
+fn the_arm_has_the_failures_of_its_parts() {
+    let example = esl_conformance::root().join("examples/manipulator/scripted.esl");
+    let example = example.to_string_lossy().into_owned();
+    let folder = Folder::new("failing-arm");
+    let (status, output, errors) = run(&folder, &["failures", "--format", "csv", &example]);
+    assert_eq!(status, Some(0), "{errors}");
+    let causes = |function: &str| -> Vec<&str> {
+        let rows = output.lines().filter_map(|line| line.strip_prefix("function,"));
+        let rows = rows.filter_map(|row| row.strip_prefix(function)?.strip_prefix(','));
+        rows.filter_map(|row| row.split(',').nth(1)).collect()
+    };
+    // A hanging camera is reset three times. A rejected goal is a motion that has failed.
+    assert!(causes("look").contains(&":camera-silent") && !causes("look").contains(&":timeout"), "{output}");
+    assert!(
+        causes("move").contains(&":motion-failed") && !causes("move").contains(&":goal-rejected"),
+        "{output}"
+    );
+    assert!(causes("reach").contains(&":out-of-reach"), "{output}");
+    assert!(
+        causes("bring-turned").contains(&":missed") && causes("bring-turned").contains(&":grip-lost"),
+        "{output}"
+    );
+    assert_eq!(causes("bring"), [":all-failed"], "{output}");
+    assert_eq!(causes("clear-table"), Vec::<&str>::new(), "{output}");
+    assert!(
+        causes("work").contains(&":motion-failed") && !causes("work").contains(&":battery-low"),
+        "{output}"
+    );
+    assert!(causes("note").is_empty(), "{output}");
+}
