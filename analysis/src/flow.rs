@@ -111,7 +111,7 @@ pub(crate) struct RunningCode {
 
 /// A value on its way.
 #[derive(Debug)]
-enum FlowStep {
+enum FlowArrival {
     /// To all that watches a cell.
     Cell(CellId, FlowValue),
     /// To a new watcher.
@@ -133,7 +133,7 @@ pub(crate) struct ValueFlow<'a> {
     pub(crate) running: Vec<RunningCode>,
     seen: FxHashSet<(Spot, NodeEffect)>,
     unread: VecDeque<usize>,
-    arrivals: VecDeque<FlowStep>,
+    arrivals: VecDeque<FlowArrival>,
     /// Objects whose first elements are told apart from the others.
     exact: FxHashSet<ThingId>,
     /// Spots that fail with a computed cause.
@@ -244,7 +244,7 @@ impl<'a> ValueFlow<'a> {
         let place = &mut self.cells[cell.index()];
         if place.known.insert(value) {
             place.values.push(value);
-            self.arrivals.push_back(FlowStep::Cell(cell, value));
+            self.arrivals.push_back(FlowArrival::Cell(cell, value));
         }
     }
 
@@ -264,7 +264,7 @@ impl<'a> ValueFlow<'a> {
         place.watchers.push(watcher.clone());
         // Those on their way arrive in the new watcher too, which does no harm.
         let values = place.values.iter();
-        self.arrivals.extend(values.map(|value| FlowStep::Watcher(watcher.clone(), *value)));
+        self.arrivals.extend(values.map(|value| FlowArrival::Watcher(watcher.clone(), *value)));
     }
 
     /// Notes an effect of a node.
@@ -332,13 +332,13 @@ impl<'a> ValueFlow<'a> {
                 continue;
             }
             match self.arrivals.pop_front() {
-                Some(FlowStep::Cell(cell, value)) => {
+                Some(FlowArrival::Cell(cell, value)) => {
                     for index in 0..self.cells[cell.index()].watchers.len() {
                         let watcher = self.cells[cell.index()].watchers[index].clone();
                         self.arrive(&watcher, value);
                     }
                 }
-                Some(FlowStep::Watcher(watcher, value)) => self.arrive(&watcher, value),
+                Some(FlowArrival::Watcher(watcher, value)) => self.arrive(&watcher, value),
                 None => return,
             }
         }

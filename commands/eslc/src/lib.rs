@@ -151,9 +151,9 @@ enum EslcAction {
     ///
     /// For each task and function: the causes of the failures that can leave it, where these begin, which
     /// clauses take them and how the clauses answer. The modules that the files require are looked at too.
-    /// `(declaim (fails NAME CAUSE…))` declares the causes of a function: others are errors, declared ones that
-    /// never come are warnings. Exit status: 0 the table is printed; 2 wrong usage, or a file that cannot be
-    /// read; 3 there are errors.
+    /// `(declaim (fails NAME CAUSE…))` declares the causes of a function: others are errors, and declared ones
+    /// that never come are warnings. Exit status: 0 the table is printed; 2 wrong usage, or a file that cannot
+    /// be read; 3 there are errors.
     Failures {
         #[command(flatten)]
         options: FailureOptions,

@@ -30,6 +30,7 @@ mod chapters {
         modules = "modules.md",
         operate = "operate.md",
         plans = "plans.md",
+        possible_failures = "possible-failures.md",
         property_locks = "property-locks.md",
         python = "python.md",
         reference = "reference.md",
