@@ -43,8 +43,8 @@ impl Observer for Onlooker {
     }
 }
 
-/// Causes of limits of the run, which are in no table.
-const LIMITS: [&str; 2] = [":stack-exhausted", ":heap-exhausted"];
+/// Causes of limits and rights of the run, which are in no table. A task that a limit ends has no cause here.
+const LIMITS: [&str; 4] = [":stack-exhausted", ":heap-exhausted", ":permission-denied", ""];
 
 fn has(rows: &[CauseRow], cause: &str) -> bool {
     let is_error = |row: &CauseRow| row.is_mistake;
@@ -54,13 +54,14 @@ fn has(rows: &[CauseRow], cause: &str) -> bool {
 }
 
 /// Causes of errors of the standard.
-const STANDARD: [&str; 28] = [
+const STANDARD: [&str; 29] = [
     ":detailed-type-error",
     ":case-failure",
     ":bounding-indices-error",
     ":simple-program-error",
     ":simple-stream-error",
     ":would-block",
+    ":no-applicable-method-error",
     ":type-error",
     ":simple-error",
     ":division-by-zero",
