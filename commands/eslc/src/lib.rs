@@ -149,11 +149,11 @@ enum EslcAction {
     },
     /// List possible failures, the clauses that take them, and those that reach the top
     ///
-    /// For each task and function: the causes of the failures that can leave it, where these begin, which
-    /// clauses take them and how the clauses answer. The modules that the files require are looked at too.
-    /// `(declaim (fails NAME CAUSE…))` declares the causes of a function: others are errors, and declared ones
-    /// that never come are warnings. Exit status: 0 the table is printed; 2 wrong usage, or a file that cannot
-    /// be read; 3 there are errors.
+    /// For each task and function: the causes of the failures that can leave it, where these begin,
+    /// which clauses take them and how the clauses answer. The modules that the files require are
+    /// looked at too. `(declaim (fails NAME CAUSE…))` declares the causes of a function: others are
+    /// errors, and declared ones that never come are warnings. Exit status: 0 the table is printed;
+    /// 2 wrong usage, or a file that cannot be read; 3 there are errors.
     Failures {
         #[command(flatten)]
         options: FailureOptions,
