@@ -113,6 +113,10 @@ impl ValueFlow<'_> {
             }
             "%SUBSCRIBE-BY-HAND" => self.lock_property(call),
             "%CALL-WITH-RESOURCES" => self.with_resources(call),
+            "%CALL-WITH-FLEET-RESOURCES" => {
+                self.with_resources(call);
+                self.fail(spot, "LEASE-LOST");
+            }
             "%ACQUIRE" => {
                 if self.quoted(call, 1).is_none_or(|denied| denied.name() == "FAIL") {
                     self.fail(spot, "RESOURCE-DENIED");

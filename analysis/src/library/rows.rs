@@ -115,6 +115,7 @@ const TAKING_FUNCTIONS: &[&str] = &[
     "%CALL-WITH-QUOTA",
     "%CALL-MAINTAINING",
     "%CALL-WITH-RESOURCES",
+    "%CALL-WITH-FLEET-RESOURCES",
     "%CALL-WITH-QUERY-BINDINGS",
     "%CALL-GUARDED",
     "%SPAWN",
@@ -309,7 +310,8 @@ pub(crate) fn function_positions(name: &str) -> &'static [usize] {
         | "SUBST-IF"
         | "NSUBST-IF"
         | "%CALL-WITH-QUOTA"
-        | "%CALL-WITH-RESOURCES" => &[1],
+        | "%CALL-WITH-RESOURCES"
+        | "%CALL-WITH-FLEET-RESOURCES" => &[1],
         "MERGE" => &[3],
         "%CALL-WITH-LIMIT" | "%CALL-MAINTAINING" | "%CALL-WITH-QUERY-BINDINGS" | "%CALL-IN-WORLD" => &[2],
         "%CALL-GUARDED" => &[0, 1, 2],
@@ -391,6 +393,7 @@ const OF_FORMS: &[&str] = &[
     "OPERATION-BUSY",
     "SUPERSEDED",
     "LINE-TOO-LONG",
+    "LEASE-LOST",
     "PERMISSION-DENIED",
     "NOT-IN-THIS-WORLD",
     "NO-SUCH-PARAMETER",
