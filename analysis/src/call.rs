@@ -218,19 +218,20 @@ impl ValueFlow<'_> {
             self.watch(*cell, FlowWatcher::Contents(inside));
             self.watch(*cell, FlowWatcher::Parts);
         }
+        // In one order and without the function itself left out: a function of the library that is called as a
+        // value, with these arguments, then leads to the same call again, and not to another one.
+        let mut passed: Vec<CellId> = cells.iter().chain(&any).copied().chain([inside, returned]).collect();
+        passed.sort_unstable();
+        passed.dedup();
         for (index, cell) in cells.iter().chain(&any).enumerate() {
             self.copy(*cell, value);
-            if positions.is_some_and(|positions| !positions.contains(&index)) && index < arguments.given.len()
-            {
+            let is_other = positions.is_some_and(|positions| !positions.contains(&index));
+            if is_other && index < arguments.given.len() {
                 continue;
             }
-            let symbols = positions.is_some();
-            let any =
-                cells.iter().chain(&any).copied().filter(|other| other != cell).chain([inside, returned]);
-            let given = CallArguments { any: any.collect(), ..CallArguments::default() };
-            let is_list = arguments.lists.contains(cell);
-            let function = if is_list { inside } else { *cell };
-            self.call_values(spot, function, given, Some(returned), Passing::Through, symbols);
+            let given = CallArguments { any: passed.clone(), ..CallArguments::default() };
+            let function = if arguments.lists.contains(cell) { inside } else { *cell };
+            self.call_values(spot, function, given, Some(returned), Passing::Through, positions.is_some());
         }
         self.copy(inside, value);
         self.copy(inside, returned);
