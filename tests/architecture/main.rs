@@ -28,7 +28,7 @@ const SECTIONS: [(&str, &str); 12] = [
 ];
 
 /// Folders of the packages that the table of tools lists as a whole.
-const TOOLS: [&str; 13] = [
+const TOOLS: [&str; 14] = [
     "analysis",
     "commands/eslc",
     "commands/eslvm",
