@@ -218,8 +218,8 @@ impl ValueFlow<'_> {
             self.watch(*cell, FlowWatcher::Contents(inside));
             self.watch(*cell, FlowWatcher::Parts);
         }
-        // In one order, the function itself included: a function of the library that is called as a value, with
-        // these arguments, then leads to the same call again, and not to another one.
+        // In one order, the function itself included: a function of the library that is called as a value,
+        // with these arguments, then leads to the same call again, and not to another one.
         let mut passed: Vec<CellId> = cells.iter().chain(&any).copied().chain([inside, returned]).collect();
         passed.sort_unstable();
         passed.dedup();
