@@ -91,8 +91,8 @@ pub(crate) fn recover(
     while let Some((from, source)) = sources.pop() {
         for failure in &source.failures {
             let mut goes_on = true;
-            for clause in 0..count {
-                if !goes_on || clauses[clause].limit == ClauseLimit::Times(0) {
+            for (clause, guarding) in clauses.iter().enumerate() {
+                if !goes_on || guarding.limit == ClauseLimit::Times(0) {
                     continue;
                 }
                 let match_ = applies(*failure, clause);
@@ -107,18 +107,18 @@ pub(crate) fn recover(
             }
         }
         let mut left = source.mistakes;
-        for clause in 0..count {
-            let (all, some) = mistakes_named(clauses[clause].cause.name());
+        for (clause, guarding) in clauses.iter().enumerate() {
+            let (all, some) = mistakes_named(guarding.cause.name());
             handled.mistakes[clause] |= left & some;
-            if !passes_on(clause, from) && clauses[clause].limit != ClauseLimit::Times(0) {
+            if !passes_on(clause, from) && guarding.limit != ClauseLimit::Times(0) {
                 left &= !all;
             }
         }
         handled.leaving.mistakes |= left;
-        for clause in 0..count {
+        for (clause, guarding) in clauses.iter().enumerate() {
             // A limit of the run may come at any place.
             let is_wide = matches!(
-                clauses[clause].cause.name(),
+                guarding.cause.name(),
                 "GENERAL-FAILURE" | "STACK-EXHAUSTED" | "HEAP-EXHAUSTED" | "STORAGE-CONDITION"
             );
             let is_reached = is_wide || !handled.taken[clause].is_empty() || handled.mistakes[clause] != 0;

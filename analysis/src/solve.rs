@@ -291,7 +291,9 @@ fn failing_call(form: &CoreForm, node: NodeId) -> Option<String> {
                 .and_then(|node| form.symbol(*node))
                 .map_or(String::new(), |one| one.name().into()),
         ),
-        "ERROR" | "%FAIL-WITH" | "%FAIL-AS" | "%FAIL-ALL" | "%NO-CASE" => Some(String::new()),
+        "ERROR" | "%FAIL-WITH" | "%FAIL-BECAUSE-OF" | "%FAIL-AS" | "%FAIL-ALL" | "%NO-CASE" => {
+            Some(String::new())
+        }
         _ => None,
     }
 }

@@ -155,7 +155,7 @@ impl Maker<'_, '_> {
     fn place_of(&self, span: esl_bytecode::span::Span) -> CodePlace {
         let source = self.sources.name(span.source).unwrap_or_default().to_string();
         match self.sources.place(span) {
-            Some(place) => CodePlace { source, line: place.line as u32, column: place.column as u32 },
+            Some(place) => CodePlace { source, line: place.line, column: place.column },
             None => CodePlace { source, line: 0, column: 0 },
         }
     }
@@ -359,8 +359,15 @@ impl Maker<'_, '_> {
             is_awaited: false,
             clauses: clauses_of(tops),
         }];
-        let mut groups: BTreeMap<(CodePlace, String), (LeavingFailures, Vec<Code>, TaskKind, bool)> =
-            BTreeMap::new();
+        /// The works that begin at one place under one name.
+        struct TaskGroup {
+            leaving: LeavingFailures,
+            codes: Vec<Code>,
+            kind: TaskKind,
+            is_awaited: bool,
+        }
+
+        let mut groups = BTreeMap::<(CodePlace, String), TaskGroup>::new();
         for (index, work) in self.flow.works.iter().enumerate() {
             let (place, name) = match work.key {
                 WorkKey::Begun(spot, _) => {
@@ -376,25 +383,23 @@ impl Maker<'_, '_> {
             if !self.is_own(&place.source) || bodies[index].is_empty() {
                 continue;
             }
-            let group = groups.entry((place, name)).or_insert((
-                LeavingFailures::default(),
-                Vec::new(),
-                work.kind,
-                work.is_awaited,
-            ));
-            group.0.add(&self.solution.of_works[index]);
-            group.1.extend(&bodies[index]);
-            group.3 |= work.is_awaited;
+            let group = groups.entry((place, name)).or_insert_with(|| TaskGroup {
+                leaving: LeavingFailures::default(),
+                codes: Vec::new(),
+                kind: work.kind,
+                is_awaited: work.is_awaited,
+            });
+            group.leaving.add(&self.solution.of_works[index]);
+            group.codes.extend(&bodies[index]);
+            group.is_awaited |= work.is_awaited;
         }
-        rows.extend(groups.into_iter().map(|((place, name), (leaving, codes, kind, is_awaited))| {
-            FailingTask {
-                name,
-                kind,
-                place,
-                causes: self.rows_of(&leaving),
-                is_awaited,
-                clauses: clauses_of(codes),
-            }
+        rows.extend(groups.into_iter().map(|((place, name), group)| FailingTask {
+            name,
+            kind: group.kind,
+            place,
+            causes: self.rows_of(&group.leaving),
+            is_awaited: group.is_awaited,
+            clauses: clauses_of(group.codes),
         }));
         rows
     }

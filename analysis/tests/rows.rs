@@ -46,6 +46,20 @@ fn clauses_take_failures_for_good_if_they_leave() {
 }
 
 #[test]
+fn a_module_fails_by_the_program_s_code() {
+    check(
+        "(defstruct activity failer)
+         (defvar *activity*
+           (make-activity :failer (lambda (causes cause &rest arguments)
+                                    (apply #'esl::%fail-because-of causes cause arguments))))
+         (defun fail-by (activity cause &rest arguments)
+           (apply (activity-failer activity) nil cause arguments))
+         (defun f () (fail-by *activity* :broken 1))",
+        ":broken",
+    );
+}
+
+#[test]
 fn clauses_of_one_form_call_each_other() {
     // The example of the paper, which ends with the cause :FOO.
     check(

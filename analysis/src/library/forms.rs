@@ -25,6 +25,13 @@ impl ValueFlow<'_> {
                     None => self.fail_by_list(call),
                 }
             }
+            "%FAIL-BECAUSE-OF" => {
+                self.note_failure_arguments(&call.arguments);
+                match call.argument(1) {
+                    Some(cause) => self.fail_with_cell(spot, cause),
+                    None => self.fail_by_list(call),
+                }
+            }
             "ERROR" | "%FAIL-WITH" | "%FAIL-OUTWARD" | "%ASSERTION-FAILED" | "%OTHER-VALUE" => {
                 self.error(call, 0)
             }
