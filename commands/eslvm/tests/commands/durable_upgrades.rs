@@ -2,11 +2,11 @@
 
 use std::process::Stdio;
 
-use crate::durable::Agent;
+use crate::durable::{Agent, Running};
 use crate::eslvm;
 
-/// An agent that counts by `step`, and keeps what it has counted in structures. It waits long enough between
-/// its lines to be killed there.
+/// An agent that counts by `step`, and keeps what it has counted in structures. It says that it waits, long
+/// enough to be killed then: what came before has its place in the journal.
 const AGENT: &str = "(defstruct leg metres)
 (defparameter *unit* \"m\")
 (defvar *legs* nil)
@@ -20,18 +20,24 @@ const AGENT: &str = "(defstruct leg metres)
 (dotimes (i 6)
   (note i)
   (unless *first* (setq *first* (first *legs*)))
+  (say \"waits\")
   (sleep 1))
 (report)
 (say \"~a\" (eq *first* (first (last *legs*))))
 (exit 7)";
 
+/// Kills an agent while it waits behind a line. Returns its errors.
+fn kill_behind(mut running: Running, line: &str) -> String {
+    running.wait_for(line);
+    running.wait_for("waits");
+    running.send("-KILL");
+    running.end().1
+}
+
 /// Starts an agent and kills it behind a line.
 fn killed_behind(name: &str, text: &str, line: &str) -> Agent {
     let agent = Agent::new(name, text);
-    let mut running = agent.start(&[]);
-    running.wait_for(line);
-    running.send("-KILL");
-    running.end();
+    kill_behind(agent.start(&[]), line);
     agent
 }
 
@@ -70,10 +76,7 @@ fn definitions_are_made_in_flight() {
     assert!(output.ends_with(expected), "{output}");
     assert_eq!(journal(&agent), before, "neither has written anything");
     // The upgraded run is killed too; then the new program is its program.
-    let mut running = agent.start(&["--upgrade"]);
-    running.wait_for("40 cm");
-    running.send("-KILL");
-    let (_, errors) = running.end();
+    let errors = kill_behind(agent.start(&["--upgrade"]), "40 cm");
     assert!(errors.contains("eslvm: upgraded: 3 definitions; not definitions"), "{errors}");
     agent.folder.file("agent.esl", AGENT);
     let (status, _, errors) = agent.run(&[]);
@@ -81,7 +84,7 @@ fn definitions_are_made_in_flight() {
     agent.folder.file("agent.esl", &new);
     let (status, output, errors) = agent.run(&[]);
     assert_eq!(status, Some(7), "{output}{errors}");
-    assert!(output.ends_with("50 cm\n(50 40 30 2 1 0)\nT\n"), "{output}");
+    assert!(output.ends_with("50 cm\nwaits\n(50 40 30 2 1 0)\nT\n"), "{output}");
     assert!(agent.state(&["--log"]).1.contains("upgraded in process 2"));
     let mut replay = eslvm(&["replay", &agent.folder.join("state/journal.eslj")]);
     let replayed = replay.stdin(Stdio::null()).output().expect("the command is there");
@@ -132,10 +135,7 @@ fn structures_get_the_slots_of_their_new_definition() {
 (define-upgrade (leg) (old) (make-leg :metres (leg-metres old) :speed (- (leg-metres old))))",
     );
     agent.folder.file("agent.esl", &first);
-    let mut running = agent.start(&["--upgrade"]);
-    running.wait_for("3 m");
-    running.send("-KILL");
-    let (_, errors) = running.end();
+    let errors = kill_behind(agent.start(&["--upgrade"]), "3 m");
     assert!(errors.contains("new slots in 2 structures"), "{errors}");
     // Instances from before both upgrades, and from between them.
     let second = AGENT

@@ -228,9 +228,11 @@ fn the_executive_flies_what_basilisk_simulates() {
 /// Returns a free port outside the range from which the system chooses ports; each test gets another one.
 pub(crate) fn free_port() -> u16 {
     static ASKED: AtomicU16 = AtomicU16::new(0);
-    let first = 20_000 + u16::try_from(std::process::id() % 10_000).expect("it is small");
-    let first = first + 100 * ASKED.fetch_add(1, Ordering::Relaxed);
-    (first..32_000).find(|&port| TcpListener::bind(("127.0.0.1", port)).is_ok()).expect("one is free")
+    let asked = 100 * u32::from(ASKED.fetch_add(1, Ordering::Relaxed));
+    let first = 20_000 + u16::try_from((std::process::id() + asked) % 12_000).expect("it is small");
+    let mut ports = (first..32_000).chain(20_000..first);
+    let is_free = |port: &u16| TcpListener::bind(("127.0.0.1", *port)).is_ok();
+    ports.find(is_free).expect("one is free")
 }
 
 /// The watchdog starts a service again that has died, and ends it when it ends itself.
