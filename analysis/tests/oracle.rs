@@ -1,5 +1,6 @@
 //! The oracle: programs are run, and each failure that is seen to end a task or to reach a recovery
 //! procedure is in the table of the program.
+#![allow(clippy::print_stderr, reason = "long runs show their findings at once")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -44,7 +45,8 @@ impl Observer for Onlooker {
 }
 
 /// Causes of limits and rights of the run, which are in no table. A task that a limit ends has no cause here.
-const LIMITS: [&str; 4] = [":stack-exhausted", ":heap-exhausted", ":permission-denied", ""];
+const LIMITS: [&str; 5] =
+    [":stack-exhausted", ":heap-exhausted", ":permission-denied", ":not-in-this-world", ""];
 
 fn has(rows: &[CauseRow], cause: &str) -> bool {
     let is_error = |row: &CauseRow| row.is_mistake;
