@@ -186,7 +186,7 @@ fn start_store(test: &str) -> Option<Store> {
             .args(["--data-dir", &folder.join("data"), "--listen-client-urls", &client])
             .args(["--advertise-client-urls", &client, "--listen-peer-urls", &peer])
             .args(["--initial-advertise-peer-urls", &peer, "--initial-cluster", &format!("default={peer}")])
-            .args(["--unsafe-no-fsync=true"])
+            .env("ETCD_UNSAFE_NO_FSYNC", "true")
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
