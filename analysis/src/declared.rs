@@ -1,9 +1,13 @@
 //! Declarations `(declaim (fails name cause*))`, compared with the findings of the analysis.
 
+use std::collections::BTreeMap;
+
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::LambdaId;
 
 use crate::cause::{Applies, clause_applies};
+use crate::forms::DeclaredCauses;
 use crate::guard::LeavingFailures;
 use crate::table::{Maker, shown_function};
 use crate::value::{Code, NO_CONTEXT};
@@ -54,6 +58,15 @@ impl Maker<'_, '_> {
             (found.primary.span.source, found.primary.span.start, found.message.clone())
         });
         findings
+    }
+
+    /// Returns the declared causes of functions, by their names.
+    pub(crate) fn declared(&self) -> BTreeMap<String, Vec<String>> {
+        let row = |(name, declared): (&Symbol, &DeclaredCauses)| {
+            let causes = declared.causes.iter().map(|cause| cause.to_string().to_lowercase());
+            (shown_function(name), causes.collect())
+        };
+        self.flow.forms.declared.iter().map(row).collect()
     }
 
     fn leaving_main(&self) -> LeavingFailures {

@@ -111,9 +111,42 @@ pub struct FailureTable {
     pub tasks: Vec<FailingTask>,
     /// Clauses, in the order of the text.
     pub clauses: Vec<ClauseRow>,
+    /// Causes that the program declares for functions, by their names in lower case.
+    pub declared: BTreeMap<String, Vec<String>>,
     /// Declarations that do not hold.
     pub findings: Vec<esl_bytecode::diagnostic::Diagnostic>,
 }
+
+impl FailureTable {
+    /// Returns the known causes of failures of functions and operations, such as `:timeout`, by the names of
+    /// these in lower case: those that the program shows, those of scripts of worlds, and declared ones.
+    pub fn causes_by_name(&self) -> BTreeMap<String, Vec<String>> {
+        let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        let mut add = |name: &str, cause: &str| {
+            // A declared cause stands for those below it, too.
+            let cause = cause.split(' ').next().unwrap_or_default();
+            let causes = all.entry(name.to_string()).or_default();
+            if cause.starts_with(':') && !causes.iter().any(|known| known == cause) {
+                causes.push(cause.to_string());
+            }
+        };
+        for function in &self.functions {
+            function.causes.iter().for_each(|row| add(&function.name, &row.cause));
+        }
+        for task in &self.tasks {
+            if let Some(name) = task.name.strip_prefix(SCRIPTED) {
+                task.causes.iter().for_each(|row| add(name, &row.cause));
+            }
+        }
+        for (name, causes) in &self.declared {
+            causes.iter().for_each(|cause| add(name, cause));
+        }
+        all
+    }
+}
+
+/// Beginning of the names of the tasks in which scripts of worlds answer.
+const SCRIPTED: &str = "scripted ";
 
 /// The maker of the table.
 pub(crate) struct Maker<'m, 'f> {
@@ -248,6 +281,7 @@ impl Maker<'_, '_> {
             functions: self.functions(),
             tasks: self.tasks(&by_scope),
             clauses: clauses.into_iter().map(|(_, row)| row).collect(),
+            declared: self.declared(),
             findings: self.findings(),
         }
     }
@@ -376,7 +410,7 @@ impl Maker<'_, '_> {
                     (place, name.unwrap_or_else(|| self.name_of_task(&bodies[index], work.kind)))
                 }
                 WorkKey::Scripted(name) => {
-                    (CodePlace::default(), format!("scripted {}", shown_function(self.flow.symbol(name))))
+                    (CodePlace::default(), format!("{SCRIPTED}{}", shown_function(self.flow.symbol(name))))
                 }
                 WorkKey::Host(_) => continue,
             };

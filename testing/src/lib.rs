@@ -22,6 +22,7 @@
 
 pub mod coverage;
 pub mod explore;
+pub mod inject;
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};

@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 
 use super::flat::CellLines;
+use super::injected::{InjectedOutcomes, end_effect, exercised};
 use super::text::end_of;
 use crate::table::{CauseRow, FailureOrigin, FailureTable};
 use crate::value::TaskKind;
@@ -29,8 +30,9 @@ fn has(rows: &[CauseRow], cause: &str, origin: &FailureOrigin) -> bool {
     rows.iter().any(|row| row.cause == cause && row.origins.contains(origin))
 }
 
-/// Returns the lines, with severities and notes of `earlier`, a table in CSV that this has made.
-pub(super) fn lines(table: &FailureTable, earlier: Option<&str>) -> CellLines {
+/// Returns the lines, with severities and notes of `earlier`, a table in CSV that this has made, and with the
+/// outcomes of injected runs.
+pub(super) fn lines(table: &FailureTable, earlier: Option<&str>, mut seen: InjectedOutcomes) -> CellLines {
     let mut kept = notes_of(earlier.unwrap_or_default());
     let mut modes: BTreeMap<(String, String), Vec<FailureOrigin>> = BTreeMap::new();
     let all = table
@@ -92,6 +94,9 @@ pub(super) fn lines(table: &FailureTable, earlier: Option<&str>) -> CellLines {
             })
             .map(|task| task.name.as_str())
             .collect();
+        let runs = seen.take(&item, &mode).unwrap_or_default();
+        let end = if runs.is_empty() { end } else { end_effect(&runs) };
+        let tests: Vec<String> = tests.into_iter().map(String::from).chain(exercised(&runs)).collect();
         let or_none =
             |parts: Vec<String>| if parts.is_empty() { "none".to_string() } else { parts.join("; ") };
         lines.push(vec![
@@ -106,6 +111,12 @@ pub(super) fn lines(table: &FailureTable, earlier: Option<&str>) -> CellLines {
             severity,
             notes,
         ]);
+    }
+    for (item, mode, runs) in seen.rest() {
+        let (severity, notes) = kept.remove(&(item.clone(), mode.clone())).unwrap_or_default();
+        let none = || "none".to_string();
+        let (end, tests) = (end_effect(&runs), exercised(&runs).join(", "));
+        lines.push(vec![item, mode, "injected".into(), none(), none(), none(), end, tests, severity, notes]);
     }
     for ((item, mode), (severity, notes)) in kept {
         if severity.is_empty() && notes.is_empty() {
@@ -179,7 +190,7 @@ mod tests {
         let csv = "item,failure mode,severity,notes\r\nslew,:stuck,2,oil it\r\n";
         let known = notes_of(csv);
         assert_eq!(known[&("slew".into(), ":stuck".into())], ("2".into(), "oil it".into()));
-        let lines = lines(&FailureTable::default(), Some(csv));
+        let lines = lines(&FailureTable::default(), Some(csv), InjectedOutcomes::default());
         assert_eq!(lines[1][9], format!("{STALE}; oil it"));
     }
 }

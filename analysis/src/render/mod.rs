@@ -2,10 +2,13 @@
 
 mod flat;
 mod fmea;
+mod injected;
 mod json;
 mod text;
 
 use crate::table::FailureTable;
+
+pub use injected::{InjectedError, InjectedOutcomes};
 
 /// Form of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,9 +37,15 @@ pub fn render(table: &FailureTable, format: TableFormat) -> String {
 }
 
 /// Returns the failure modes and effects of a program as a table; as text, that is Markdown. `earlier` is
-/// such a table in CSV, whose severities and notes are carried over.
-pub fn render_fmea(table: &FailureTable, format: TableFormat, earlier: Option<&str>) -> String {
-    let lines = fmea::lines(table, earlier);
+/// such a table in CSV, whose severities and notes are carried over; `seen` has the outcomes of runs with
+/// injected faults, which are the end effects then.
+pub fn render_fmea(
+    table: &FailureTable,
+    format: TableFormat,
+    earlier: Option<&str>,
+    seen: InjectedOutcomes,
+) -> String {
+    let lines = fmea::lines(table, earlier, seen);
     match format {
         TableFormat::Csv => flat::csv(&lines),
         TableFormat::Html => flat::html("Failure modes and effects", &lines),

@@ -1,11 +1,11 @@
 //! `eslc failures`: the possible failures of a program, the clauses that take them, the ones that reach the
 //! top.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use esl::program;
-use esl_analysis::render::{TableFormat, render, render_fmea};
+use esl_analysis::render::{InjectedOutcomes, TableFormat, render, render_fmea};
 use esl_analysis::{AnalysisOptions, analyze};
 use esl_bytecode::diagnostic::Severity;
 use esl_command as command;
@@ -31,6 +31,9 @@ pub(crate) struct FailureOptions {
     /// File with an earlier table of `--fmea --format csv`, whose severities and notes are carried over
     #[arg(long, value_name = "FILE", requires = "fmea")]
     notes: Option<PathBuf>,
+    /// File that `eslvm test --inject --format json` has written: the end effects are those that were seen
+    #[arg(long, value_name = "FILE", requires = "fmea")]
+    injected: Vec<PathBuf>,
     /// List programming errors too, such as values of a wrong type
     #[arg(long)]
     all: bool,
@@ -79,18 +82,31 @@ pub(crate) fn list_failures(options: &FailureOptions) -> Result<u8, u8> {
         TableForm::Md => TableFormat::Markdown,
         TableForm::Html => TableFormat::Html,
     };
-    let earlier = match &options.notes {
-        Some(file) => Some(std::fs::read_to_string(file).map_err(|error| {
-            command::complain(format_args!("{} cannot be read: {error}", file.display()));
-            USAGE
-        })?),
-        None => None,
-    };
+    let earlier = options.notes.as_deref().map(read_text).transpose()?;
+    let mut injected = Vec::new();
+    for file in &options.injected {
+        injected.push(read_text(file)?);
+    }
+    let seen = InjectedOutcomes::read(injected.iter().map(String::as_str)).map_err(|error| {
+        command::complain(format_args!("--injected: {error}"));
+        USAGE
+    })?;
     let text = match (&options.explain, options.fmea) {
         (Some(_), _) => explanation,
-        (None, true) => render_fmea(&table, format, earlier.as_deref()),
+        (None, true) => render_fmea(&table, format, earlier.as_deref(), seen),
         (None, false) => render(&table, format),
     };
     print(&text)?;
     Ok(if has_failed { NOT_COMPILED } else { SUCCESS })
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// The exit status, after a message.
+fn read_text(file: &Path) -> Result<String, u8> {
+    std::fs::read_to_string(file).map_err(|error| {
+        command::complain(format_args!("{} cannot be read: {error}", file.display()));
+        USAGE
+    })
 }

@@ -1,5 +1,6 @@
 //! `eslvm test`: the tests of several files, in several threads, and what is said of them.
 
+pub mod inject;
 mod junit;
 mod watch;
 

@@ -28,6 +28,7 @@ mod http;
 mod http_client;
 mod http_peers;
 mod http_server;
+mod injecting;
 #[cfg(unix)]
 mod lines;
 #[cfg(target_os = "linux")]

@@ -23,6 +23,7 @@ mod chapters {
         durable = "durable.md",
         embedding = "embedding.md",
         failure = "failure.md",
+        faults = "faults.md",
         fleets = "fleets.md",
         goals = "goals.md",
         mavlink = "mavlink.md",

@@ -132,6 +132,7 @@ fn main() -> ExitCode {
             coverage,
             full,
             no_explore,
+            injecting,
             budget,
             memory,
             compiling,
@@ -142,23 +143,23 @@ fn main() -> ExitCode {
             rights.rights().map(|rights| {
                 let config = Config { budget: Some(budget), memory, ..Config::default() };
                 let jobs = jobs.map_or_else(processors, usize::from);
-                testing::run(
-                    &sources,
-                    &modules.library,
-                    &testing::Options {
-                        filter,
-                        is_watching: watch,
-                        jobs,
-                        seed,
-                        junit,
-                        coverage,
-                        config,
-                        rights,
-                        is_quiet,
-                        is_full: full,
-                        explores: !no_explore,
-                    },
-                )
+                let options = testing::Options {
+                    filter,
+                    is_watching: watch,
+                    jobs,
+                    seed,
+                    junit,
+                    coverage,
+                    config,
+                    rights,
+                    is_quiet,
+                    is_full: full,
+                    explores: !no_explore,
+                };
+                match injecting.options() {
+                    Some(faults) => testing::inject::run(&sources, &modules.library, &options, &faults),
+                    None => testing::run(&sources, &modules.library, &options),
+                }
             })
         }
         EslvmAction::Completions { shell } => Ok(command::print_completions(shell, Eslvm::command())),

@@ -1,0 +1,179 @@
+//! The outcome of a run with faults, compared with the undisturbed one.
+
+use esl::program::Ended;
+
+use super::RunBound;
+use super::properties::left;
+use super::run::InjectedRun;
+use crate::{ALL_HELD, ONE_DID_NOT_HOLD};
+
+/// Outcome of a run with faults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FaultOutcome {
+    /// It ends as the undisturbed run does, with the same facts; without facts, with the same output.
+    SameResult,
+    /// It comes to its end, with another result.
+    OtherResult,
+    /// A failure or an abort ends it, or it says by its status that it has failed; all cleanups have run.
+    Failed,
+    /// A condition of `always` was false.
+    Violated,
+    /// It has ended, and a property has a value with which neither the undisturbed run ends nor begins.
+    LeftOn,
+    /// A cleanup was cut off.
+    CleanupCutOff,
+    /// It takes more virtual time, or more ticks, than its bound.
+    Hangs,
+    /// No task can ever run again.
+    Deadlocks,
+    /// Its memory is exhausted.
+    Exhausted,
+    /// The run did not come to the call.
+    NotReached,
+}
+
+impl FaultOutcome {
+    /// All of them, the good ones first.
+    pub const ALL: [FaultOutcome; 10] = [
+        FaultOutcome::SameResult,
+        FaultOutcome::OtherResult,
+        FaultOutcome::Failed,
+        FaultOutcome::NotReached,
+        FaultOutcome::Violated,
+        FaultOutcome::LeftOn,
+        FaultOutcome::CleanupCutOff,
+        FaultOutcome::Hangs,
+        FaultOutcome::Deadlocks,
+        FaultOutcome::Exhausted,
+    ];
+
+    /// Returns the outcome in words.
+    pub const fn text(self) -> &'static str {
+        match self {
+            FaultOutcome::SameResult => "recovered",
+            FaultOutcome::OtherResult => "recovered otherwise",
+            FaultOutcome::Failed => "failed, cleanups run",
+            FaultOutcome::Violated => "INVARIANT FALSE",
+            FaultOutcome::LeftOn => "LEFT ON",
+            FaultOutcome::CleanupCutOff => "CLEANUP CUT OFF",
+            FaultOutcome::Hangs => "HANGS",
+            FaultOutcome::Deadlocks => "DEADLOCK",
+            FaultOutcome::Exhausted => "MEMORY EXHAUSTED",
+            FaultOutcome::NotReached => "not reached",
+        }
+    }
+
+    /// Returns whether the program is at fault.
+    pub const fn is_bad(self) -> bool {
+        use FaultOutcome::{CleanupCutOff, Deadlocks, Exhausted, Hangs, LeftOn, Violated};
+        matches!(self, Violated | LeftOn | CleanupCutOff | Hangs | Deadlocks | Exhausted)
+    }
+}
+
+/// Returns the outcome of a run, and details in a few words.
+pub(super) fn judge(
+    run: &InjectedRun,
+    undisturbed: &InjectedRun,
+    bound: RunBound,
+    is_test: bool,
+) -> (FaultOutcome, String) {
+    if !run.violated.is_empty() {
+        return (FaultOutcome::Violated, run.violated.join("; "));
+    }
+    if run.is_endless {
+        let detail = if run.seconds > bound.seconds {
+            format!("after {:.0} s; bound {:.0} s", run.seconds, bound.seconds)
+        } else {
+            format!("after {} ticks; bound {}", run.ticks, bound.ticks)
+        };
+        return (FaultOutcome::Hangs, detail);
+    }
+    match run.ended {
+        Ended::Deadlocked => return (FaultOutcome::Deadlocks, waits(&run.errors)),
+        Ended::BudgetSpent => return (FaultOutcome::Hangs, "its budget of ticks is spent".into()),
+        Ended::HeapExhausted => return (FaultOutcome::Exhausted, String::new()),
+        Ended::Normally(_) | Ended::Failed | Ended::Signalled(_) => {}
+    }
+    if let Some(report) = &run.cut_off {
+        return (FaultOutcome::CleanupCutOff, report.clone());
+    }
+    if run.ended == undisturbed.ended {
+        let differences = differences(run, undisturbed);
+        let outcome = match differences.is_empty() {
+            true => FaultOutcome::SameResult,
+            false => FaultOutcome::OtherResult,
+        };
+        return (outcome, differences);
+    }
+    if is_test && run.ended == Ended::Normally(ONE_DID_NOT_HOLD) {
+        let line = run.errors.lines().find(|line| line.ends_with(" is false."));
+        let line = line.map_or(String::new(), |line| format!(": {line}"));
+        return (FaultOutcome::OtherResult, format!("a check did not hold{line}"));
+    }
+    let left = left(&run.properties, &undisturbed.first, &undisturbed.properties);
+    if !left.is_empty() {
+        return (FaultOutcome::LeftOn, left.join("; "));
+    }
+    let detail = match run.ended {
+        Ended::Normally(status) => format!("status {status}"),
+        _ => reason(&run.errors),
+    };
+    (FaultOutcome::Failed, detail)
+}
+
+/// Returns whether an undisturbed run is one to compare with; otherwise a text about it.
+pub(super) fn problem(run: &InjectedRun, is_test: bool) -> Option<String> {
+    let wanted = if is_test { ALL_HELD } else { 0 };
+    if !run.violated.is_empty() {
+        return Some(run.violated.join("; "));
+    }
+    if run.is_endless {
+        return Some(format!("it has not ended after {:.0} s and {} ticks", run.seconds, run.ticks));
+    }
+    match run.ended {
+        Ended::Normally(status) if status == wanted => None,
+        Ended::Normally(ONE_DID_NOT_HOLD) if is_test => Some("a check did not hold".into()),
+        Ended::Normally(status) => Some(format!("it ends with the status {status}")),
+        Ended::Deadlocked => Some(format!("deadlock: {}", waits(&run.errors))),
+        Ended::BudgetSpent => Some("its budget of ticks is spent".into()),
+        Ended::HeapExhausted => Some("its memory is exhausted".into()),
+        Ended::Failed | Ended::Signalled(_) => Some(reason(&run.errors)),
+    }
+}
+
+/// Returns the lines of a deadlock report, joined.
+fn waits(errors: &str) -> String {
+    let lines: Vec<&str> = errors
+        .lines()
+        .skip_while(|line| !line.starts_with("Deadlock:"))
+        .skip(1)
+        .take_while(|line| line.starts_with(' '))
+        .map(str::trim)
+        .collect();
+    lines.join("; ")
+}
+
+/// Returns the first line about a failure.
+fn reason(errors: &str) -> String {
+    let first = errors.lines().find(|line| line.starts_with("A failure")).or_else(|| errors.lines().next());
+    first.unwrap_or("aborted").to_string()
+}
+
+/// Most differences that are shown.
+const MOST_DIFFERENCES: usize = 4;
+
+/// Returns the differences of two results, in a few words. The output of a program with facts is a log, which
+/// tells of the fault and its times.
+fn differences(run: &InjectedRun, undisturbed: &InjectedRun) -> String {
+    let lost = undisturbed.facts.difference(&run.facts).map(|fact| format!("not {}", fact.to_lowercase()));
+    let new = run.facts.difference(&undisturbed.facts).map(|fact| fact.to_lowercase());
+    let all: Vec<String> = new.chain(lost).collect();
+    let mut shown: Vec<String> = all.iter().take(MOST_DIFFERENCES).cloned().collect();
+    if all.len() > shown.len() {
+        shown.push(format!("{} more facts", all.len() - shown.len()));
+    }
+    if undisturbed.facts.is_empty() && run.output != undisturbed.output {
+        shown.push("other output".into());
+    }
+    shown.join(", ")
+}

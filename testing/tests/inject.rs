@@ -1,0 +1,154 @@
+//! Small programs with faults, and what becomes of them.
+
+use esl::program::{Source, compile};
+use esl_testing::inject::{InjectSettings, InjectionSubject, KnownFailures, inject};
+use esl_testing::{Setup, list};
+
+/// The rows of the tests of a program, or of the program itself, as `name: outcome`.
+fn rows(text: &str, settings: &InjectSettings, known: &[(&str, &str)]) -> Vec<String> {
+    let program = compile(&[Source::new("faults.esl", text)]).program.expect("it compiles");
+    let setup = Setup::default();
+    let known: KnownFailures =
+        known.iter().map(|(name, cause)| ((*name).into(), vec![(*cause).into()])).collect();
+    let tests = list(&program, &setup).expect("it runs");
+    let names: Vec<Option<&str>> =
+        if tests.is_empty() { vec![None] } else { tests.iter().map(|test| Some(&*test.name)).collect() };
+    let mut all = Vec::new();
+    for test in names {
+        let subject = InjectionSubject { program: &program, test, seed: 0, setup: &setup };
+        let report = inject(&subject, &known, settings, &|_, _| ()).expect("it begins");
+        assert_eq!(report.problem, None);
+        all.extend(report.rows.iter().map(|row| format!("{}: {}", row.name, row.outcome.text())));
+    }
+    all
+}
+
+fn has(rows: &[String], wanted: &str) {
+    assert!(rows.iter().any(|row| row == wanted), "{wanted} is not in\n{}", rows.join("\n"));
+}
+
+const WHEELS: &str = "
+    (define-cause :wheel-stuck ())
+    (define-property wheels ())
+    (assert '(wheels :off))
+    (define-mock set-wheels (state) (assert (list 'wheels state)))
+    (define-mock drive (metres) (sleep metres) metres)";
+
+#[test]
+fn a_cleanup_tells_careful_from_careless() {
+    let test = |body: &str| {
+        let text = format!(
+            "{WHEELS} (deftest drives (is (with-recovery-procedures ((:wheel-stuck (retry))) {body} t)))"
+        );
+        rows(&text, &InjectSettings::default(), &[("drive", ":wheel-stuck")])
+    };
+    let careless = test("(set-wheels :on) (drive 5) (set-wheels :off)");
+    has(&careless, "drive#1:aborted: LEFT ON");
+    has(&careless, "drive#1:wheel-stuck: recovered");
+    has(&careless, "drive#1+:wheel-stuck: LEFT ON");
+    has(&careless, "drive#1:never: DEADLOCK");
+    has(&careless, "drive#1:late: recovered");
+    let careful = test(
+        "(with-cleanup-procedure (set-wheels :off)
+           (set-wheels :on) (with-timeout 100 (drive 5)) (set-wheels :off))",
+    );
+    has(&careful, "drive#1:aborted: failed, cleanups run");
+    has(&careful, "drive#1+:wheel-stuck: failed, cleanups run");
+    has(&careful, "drive#1:never: failed, cleanups run");
+}
+
+#[test]
+fn endless_retries_hang() {
+    let text = format!(
+        "{WHEELS} (deftest drives (is (with-recovery-procedures ((:wheel-stuck :retries :infinite (sleep 1) (retry)))
+                                        (drive 5))))"
+    );
+    let found = rows(&text, &InjectSettings::default(), &[("drive", ":wheel-stuck")]);
+    has(&found, "drive#1:wheel-stuck: recovered");
+    has(&found, "drive#1+:wheel-stuck: HANGS");
+}
+
+#[test]
+fn conditions_of_always_are_looked_at() {
+    let text = format!(
+        "{WHEELS} (define-fluent stops 0)
+         (always one-stop (< stops 2))
+         (defun stop () (setf stops (+ stops 1)) (sleep 1) (setf stops 0))
+         (deftest drives (is (with-recovery-procedures ((:wheel-stuck (setf stops 1) (stop) (retry))) (drive 5))))"
+    );
+    let found = rows(&text, &InjectSettings::default(), &[("drive", ":wheel-stuck")]);
+    has(&found, "drive#1:wheel-stuck: INVARIANT FALSE");
+    has(&found, "drive#1:late: recovered");
+}
+
+#[test]
+fn a_cleanup_that_does_not_end_is_seen() {
+    let text = format!("{WHEELS} (unwind-protect (drive 5) (set-wheels :off))");
+    let found = rows(&text, &InjectSettings { pairs: 50, ..InjectSettings::default() }, &[]);
+    has(&found, "drive#1:never/set-wheels#1:never: DEADLOCK");
+    let text = "(define-mock drive () (sleep 5))
+                (define-mock stop () nil)
+                (spawn (sleep 8))
+                (unwind-protect (drive) (loop (stop) (sleep 1)
+                  (when (> (now) 4) (return)))
+                  (when (< (now) 4) (sleep 1000)))";
+    let found = rows(text, &InjectSettings::default(), &[]);
+    has(&found, "drive#1:late: recovered");
+    let text = "(define-mock drive () (sleep 5))
+                (unwind-protect (drive) (when (< (now) 4) (sleep 1000)))";
+    has(&rows(text, &InjectSettings::default(), &[]), "drive#1:aborted: CLEANUP CUT OFF");
+}
+
+#[test]
+fn scripts_give_the_arguments_of_their_failures() {
+    let text = "(define-cause :wheel-stuck ())
+        (defun describe-place (x) (list 'at x))
+        (deftest drives
+          (with-world ((:answer (drive 9) :failing (:wheel-stuck left)) (:answer (drive *) :with 'there)
+                       (:answer (describe-place *) :with 'here))
+            (is (with-recovery-procedures (((:wheel-stuck wheel) (abort (if (eq wheel 'left) 'left (fail :worse)))))
+                  (drive 5) (describe-place 1) t))))";
+    let found = rows(text, &InjectSettings::default(), &[]);
+    has(&found, "drive#1:wheel-stuck: recovered");
+    has(&found, "describe-place#1:late: recovered");
+    has(&found, "describe-place#1:never: DEADLOCK");
+}
+
+#[test]
+fn rows_do_not_depend_on_threads_and_are_repeated_by_name() {
+    let text = format!("{WHEELS} (deftest drives (dotimes (i 20) (drive i)) (is t))");
+    let known = [("drive", ":wheel-stuck")];
+    let alone = rows(&text, &InjectSettings::default(), &known);
+    assert_eq!(alone, rows(&text, &InjectSettings { jobs: 4, ..InjectSettings::default() }, &known));
+    assert_eq!(alone.len(), 5 * 4 + 2);
+    let only = InjectSettings { only: Some("DRIVE#7:wheel-stuck".into()), ..InjectSettings::default() };
+    assert_eq!(rows(&text, &only, &known), ["drive#7:wheel-stuck: failed, cleanups run"]);
+    let pair =
+        InjectSettings { only: Some("drive#7:late/drive#8:never".into()), ..InjectSettings::default() };
+    assert_eq!(rows(&text, &pair, &known), ["drive#7:late/drive#8:never: DEADLOCK"]);
+}
+
+#[test]
+fn an_undisturbed_run_that_fails_is_no_measure() {
+    let program = compile(&[Source::new("bad.esl", "(define-mock look () 1) (look) (fail :dark)")]);
+    let program = program.program.expect("it compiles");
+    let subject = InjectionSubject { program: &program, test: None, seed: 0, setup: &Setup::default() };
+    let report =
+        inject(&subject, &KnownFailures::new(), &InjectSettings::default(), &|_, _| ()).expect("it begins");
+    assert_eq!(report.problem.as_deref(), Some("A failure of cause :DARK."));
+    assert!(report.rows.is_empty());
+}
+
+#[test]
+fn pairs_disturb_remedies() {
+    let text = format!(
+        "{WHEELS} (define-mock reset-wheel () (sleep 1))
+         (deftest drives (is (with-recovery-procedures ((:wheel-stuck (reset-wheel) (retry))) (drive 5))))"
+    );
+    let settings = InjectSettings { pairs: 20, ..InjectSettings::default() };
+    let known = [("drive", ":wheel-stuck")];
+    let name = "drive#1:wheel-stuck/reset-wheel#1:never";
+    has(&rows(&text, &settings, &known), &format!("{name}: DEADLOCK"));
+    let only = InjectSettings { only: Some(name.into()), ..InjectSettings::default() };
+    assert_eq!(rows(&text, &only, &known), [format!("{name}: DEADLOCK")]);
+}
