@@ -1,4 +1,5 @@
-//! Declarations `(declaim (fails name cause*))`, compared with the findings of the analysis.
+//! Declarations `(declaim (fails name cause*))`, compared with the findings of the analysis; the known causes
+//! of each function.
 
 use std::collections::BTreeMap;
 
@@ -9,8 +10,41 @@ use esl_compiler::core::LambdaId;
 use crate::cause::{Applies, clause_applies};
 use crate::forms::DeclaredCauses;
 use crate::guard::LeavingFailures;
-use crate::table::{Maker, shown_function};
+use crate::table::{FailureTable, Maker, shown_function};
 use crate::value::{Code, NO_CONTEXT};
+
+/// Beginning of the names of the tasks in which scripts of worlds answer.
+pub(crate) const SCRIPTED: &str = "scripted ";
+
+impl FailureTable {
+    /// Returns the known causes of failures of functions and operations, such as `:timeout`, by the names of
+    /// these in lower case: those that the program shows, those of scripts of worlds, and declared ones.
+    pub fn causes_by_name(&self) -> BTreeMap<String, Vec<String>> {
+        let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        let mut add = |name: &str, cause: &str| {
+            // A declared cause stands for those below it, too.
+            let cause = cause.split(' ').next().unwrap_or_default();
+            let causes = all.entry(name.to_string()).or_default();
+            if cause.starts_with(':') && !causes.iter().any(|known| known == cause) {
+                causes.push(cause.to_string());
+            }
+        };
+        for function in &self.functions {
+            let causes = function.causes.iter().filter(|row| !row.is_mistake);
+            causes.for_each(|row| add(&function.name, &row.cause));
+        }
+        for task in &self.tasks {
+            if let Some(name) = task.name.strip_prefix(SCRIPTED) {
+                let causes = task.causes.iter().filter(|row| !row.is_mistake);
+                causes.for_each(|row| add(name, &row.cause));
+            }
+        }
+        for (name, causes) in &self.declared {
+            causes.iter().for_each(|cause| add(name, cause));
+        }
+        all
+    }
+}
 
 impl Maker<'_, '_> {
     /// Returns the declarations that do not hold: errors for failures that are not declared, warnings for

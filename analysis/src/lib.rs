@@ -22,6 +22,7 @@ mod forms;
 mod guard;
 mod hot;
 mod library;
+mod rights;
 mod solve;
 mod table;
 mod taken;
@@ -39,6 +40,7 @@ use forms::CoreForms;
 use table::Maker;
 use value::{Code, NO_CONTEXT};
 
+pub use rights::{NeededRights, needed_rights};
 pub use table::{CauseRow, ClauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow};
 pub use value::TaskKind;
 

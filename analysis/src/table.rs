@@ -9,6 +9,7 @@ use esl_compiler::diagnostic::Sources;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::cause::{MISTAKES, cause_of_condition};
+use crate::declared::SCRIPTED;
 use crate::effect::{FailureKind, NodeEffect, Reason};
 use crate::flow::ValueFlow;
 use crate::forms::ScopeKind;
@@ -116,37 +117,6 @@ pub struct FailureTable {
     /// Declarations that do not hold.
     pub findings: Vec<esl_bytecode::diagnostic::Diagnostic>,
 }
-
-impl FailureTable {
-    /// Returns the known causes of failures of functions and operations, such as `:timeout`, by the names of
-    /// these in lower case: those that the program shows, those of scripts of worlds, and declared ones.
-    pub fn causes_by_name(&self) -> BTreeMap<String, Vec<String>> {
-        let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
-        let mut add = |name: &str, cause: &str| {
-            // A declared cause stands for those below it, too.
-            let cause = cause.split(' ').next().unwrap_or_default();
-            let causes = all.entry(name.to_string()).or_default();
-            if cause.starts_with(':') && !causes.iter().any(|known| known == cause) {
-                causes.push(cause.to_string());
-            }
-        };
-        for function in &self.functions {
-            function.causes.iter().for_each(|row| add(&function.name, &row.cause));
-        }
-        for task in &self.tasks {
-            if let Some(name) = task.name.strip_prefix(SCRIPTED) {
-                task.causes.iter().for_each(|row| add(name, &row.cause));
-            }
-        }
-        for (name, causes) in &self.declared {
-            causes.iter().for_each(|cause| add(name, cause));
-        }
-        all
-    }
-}
-
-/// Beginning of the names of the tasks in which scripts of worlds answer.
-const SCRIPTED: &str = "scripted ";
 
 /// The maker of the table.
 pub(crate) struct Maker<'m, 'f> {

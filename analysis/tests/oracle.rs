@@ -9,8 +9,11 @@ use std::sync::{Arc, Mutex};
 use esl::Config;
 use esl::host::VirtualHost;
 use esl::module_path::ModulePath;
-use esl::program::{Source, compile_with_core, machine, run_in, set_module_path};
+use esl::program::{Program, Source, compile_with_core, finish, load, machine, run_in, set_module_path};
 use esl_analysis::{AnalysisOptions, CauseRow, FailureTable, TaskKind, analyze};
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
 use esl_vm::observe::{Observer, Seen};
 use esl_vm::task::TaskNumber;
 
@@ -117,8 +120,13 @@ fn compare(table: &FailureTable, log: &Log) -> (Vec<String>, usize) {
             continue;
         }
         seen += 1;
+        // The main task runs a test.
         let is_main = name == "the main task";
-        let mut rows = table.tasks.iter().filter(|task| (task.kind == TaskKind::Main) == is_main);
+        let mut rows = table.tasks.iter().filter(|task| match task.kind {
+            TaskKind::Main => is_main,
+            TaskKind::Test => true,
+            _ => !is_main,
+        });
         if !rows.any(|task| has(&task.causes, cause)) {
             missed.push(format!("{name} ended by {cause}"));
         }
@@ -154,5 +162,106 @@ fn failures_that_are_seen_are_in_the_table() {
         }
     }
     assert!(runs > 20 && seen > 10, "{runs} runs with {seen} failures are too few");
+    assert!(missed.is_empty(), "{} of {seen} in {runs} runs:\n{}", missed.len(), missed.join("\n"));
+}
+
+/// Programs with operations, and the test that is run if the program alone calls none.
+const INJECTED: [(&str, Option<&str>); 5] = [
+    ("examples/spacecraft/scripted.esl", None),
+    ("examples/missions/drive-to-target.esl", None),
+    ("examples/missions/pick-and-place.esl", None),
+    ("examples/missions/safe-drive.esl", None),
+    ("examples/missions/cross-door.esl", Some("PASSES-EVERY-DOOR")),
+];
+
+/// Causes with which forms and operations fail because a task is aborted from outside, which are in no table.
+const OF_ABORTS: [&str; 2] = [":aborted", ":cancelled"];
+
+/// A program that is run with faults.
+struct InjectedProgram {
+    program: Program,
+    modules: ModulePath,
+    table: FailureTable,
+    test: Option<&'static str>,
+}
+
+impl InjectedProgram {
+    fn new(file: &str, test: Option<&'static str>) -> InjectedProgram {
+        let path = esl_conformance::root().join(file);
+        let text = std::fs::read_to_string(&path).expect("the program can be read");
+        let modules = ModulePath::new(std::iter::once(path.as_path()), &[]);
+        let mut compiled = compile_with_core(&[Source::new(file, text)], &modules);
+        let program = compiled.program.take().expect("it compiles");
+        let options = AnalysisOptions { all: true, explained: None };
+        let (table, _) = analyze(std::mem::take(&mut compiled.core), &compiled.sources, &options);
+        InjectedProgram { program, modules, table, test }
+    }
+
+    /// Runs the program with faults. Returns the failures that were seen, and the operations that it calls.
+    fn run(&self, faults: &Datum) -> (Log, Vec<Symbol>) {
+        let span = Span::default();
+        let config = Config { memory: 64 << 20, budget: Some(2_000_000), ..Config::DEFAULT };
+        let mut machine = machine(config.clone(), Box::new(VirtualHost::new())).expect("there is room");
+        set_module_path(&mut machine, &self.modules).expect("there is room");
+        let log = Arc::new(Mutex::new(Log::default()));
+        machine.coming_observers().add(Box::new(Onlooker(Arc::clone(&log))));
+        machine.inbox().inspect(esl::host::Inspection::Watch);
+        let functions = load(&mut machine, &self.program).expect("it is loaded");
+        let name = self.test.map_or_else(|| Datum::nil(span), |name| Datum::string(name, span));
+        let given = [name, faults.clone()].map(|datum| machine.import(&datum).expect("there is room"));
+        let main = machine.spawn_library("%RUN-INJECTED", &[functions, given[0], given[1]]);
+        let main = main.expect("it begins");
+        machine.set_main(main);
+        let outcome = machine.run(u64::MAX);
+        finish(&mut machine, main, outcome);
+        machine.begin_program(Config { budget: None, ..config });
+        let report = machine.library_function("%INJECTION-REPORT").expect("the library has it");
+        let values = machine.call(report, &[], u64::MAX).expect("it returns");
+        let report = machine.export(values[0]).expect("it is data");
+        let calls = report.elements().next().expect("the calls come first").clone();
+        let names = calls.elements().filter_map(|call| call.elements().next()?.as_symbol().cloned());
+        let names: Vec<Symbol> = names.collect();
+        (std::mem::take(&mut *log.lock().expect("nobody panics")), names)
+    }
+}
+
+/// Each known failure of each operation, and calls that never answer or whose task is aborted: the failures
+/// that leave tasks and reach procedures then are in the table, too.
+#[test]
+fn failures_after_injected_faults_are_in_the_table() {
+    let span = Span::default();
+    let (mut runs, mut seen, mut missed) = (0, 0, Vec::new());
+    for (file, test) in INJECTED {
+        let subject = InjectedProgram::new(file, test);
+        let known = subject.table.causes_by_name();
+        let (_, mut operations) = subject.run(&Datum::nil(span));
+        operations.sort_by_key(|operation| operation.name().to_string());
+        operations.dedup();
+        for operation in operations {
+            let causes = known.get(&operation.name().to_lowercase()).cloned().unwrap_or_default();
+            let failing = causes.iter().map(|cause| {
+                let cause = Symbol::keyword(&cause.trim_start_matches(':').to_uppercase());
+                ("FAILS", Datum::list(vec![Datum::symbol(cause, span)], span))
+            });
+            let others = ["NEVER", "ABORTED"].map(|way| (way, Datum::nil(span)));
+            for (way, arguments) in failing.chain(others) {
+                for lasts in [false, true] {
+                    let lasts = if lasts { Datum::symbol(Symbol::cl("T"), span) } else { Datum::nil(span) };
+                    let name = Datum::symbol(operation.clone(), span);
+                    let way = Datum::symbol(Symbol::keyword(way), span);
+                    let fault =
+                        Datum::list(vec![name, Datum::integer(1, span), lasts, way, arguments.clone()], span);
+                    let (log, _) = subject.run(&Datum::list(vec![fault], span));
+                    let (misses, count) = compare(&subject.table, &log);
+                    runs += 1;
+                    seen += count;
+                    let misses =
+                        misses.iter().filter(|miss| !OF_ABORTS.iter().any(|end| miss.ends_with(end)));
+                    missed.extend(misses.map(|miss| format!("{file}, {operation}: {miss}")));
+                }
+            }
+        }
+    }
+    assert!(runs > 50 && seen > 100, "{runs} runs with {seen} failures are too few");
     assert!(missed.is_empty(), "{} of {seen} in {runs} runs:\n{}", missed.len(), missed.join("\n"));
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use esl::module_path::ModulePath;
 use esl::program::{Source, compile_with_core};
-use esl_analysis::render::{TableFormat, render};
+use esl_analysis::render::{TableFormat, render, render_graph};
 use esl_analysis::{AnalysisOptions, FailureTable, analyze};
 
 /// Returns the table of a program of this repository, and the explanation of a cause.
@@ -37,6 +37,12 @@ fn compare(file: &str, text: &str) {
 fn tables_of_the_spacecraft() {
     let (table, _) = table_of("examples/spacecraft/scripted.esl", &AnalysisOptions::default());
     compare("spacecraft.txt", &render(&table, TableFormat::Text));
+}
+
+#[test]
+fn the_picture_of_the_spacecraft() {
+    let (table, _) = table_of("examples/spacecraft/scripted.esl", &AnalysisOptions::default());
+    compare("../../../examples/spacecraft/failures.svg", &render_graph(&table, "scripted.esl"));
 }
 
 #[test]

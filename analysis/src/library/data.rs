@@ -80,6 +80,19 @@ const WITHOUT_PARTS: &[&str] = &[
     "MOD",
     "STRING=",
     "STRING-EQUAL",
+    "STRING/=",
+    "STRING<",
+    "STRING>",
+    "STRING<=",
+    "STRING>=",
+    "STRING-DOWNCASE",
+    "STRING-UPCASE",
+    "STRING-CAPITALIZE",
+    "STRING-TRIM",
+    "STRING-LEFT-TRIM",
+    "STRING-RIGHT-TRIM",
+    "PARSE-INTEGER",
+    "TYPEP",
     "SYMBOL-NAME",
     "%PROCLAIM-SPECIAL",
     "BOUNDP",
@@ -87,6 +100,14 @@ const WITHOUT_PARTS: &[&str] = &[
     "CONCATENATE",
     "%STRING-CONCAT",
 ];
+
+/// Functions in ESL that return parts of their arguments, and call no function in them.
+pub(super) const CALLS_NO_ARGUMENT: &[&str] =
+    &["COERCE", "PRIN1-TO-STRING", "PRINC-TO-STRING", "%CHECK-TABLE", "COPY-SEQ", "SUBSEQ", "STRING"];
+
+/// Functions that print their first argument to the stream that is the second, and call functions only in
+/// that.
+pub(super) const PRINTING: &[&str] = &["PRIN1", "PRINC", "WRITE-STRING", "WRITE-LINE", "WRITE-CHAR"];
 
 impl ValueFlow<'_> {
     /// Looks at a call of a function of data. Returns whether it is one.

@@ -73,13 +73,18 @@ impl ValueFlow<'_> {
         if self.call_of_form(&call) || self.call_of_work(&call) || self.call_of_data(&call) {
             return;
         }
-        if builtin.is_some() {
+        if builtin.is_some() || data::CALLS_NO_ARGUMENT.contains(&call.name) {
             self.return_parts(&call);
         } else {
-            let positions = self.called_positions(&call, row.takes_functions);
+            let prints = data::PRINTING.contains(&call.name);
+            let positions = match prints {
+                true => Some(vec![1]),
+                false => self.called_positions(&call, row.takes_functions),
+            };
             self.call_arguments(spot, &call.arguments, value, positions.as_deref());
             if rows::is_of_streams(call.name) {
-                for (cell, _) in call.arguments.given {
+                let given = call.arguments.given.into_iter().skip(usize::from(prints));
+                for (cell, _) in given {
                     self.call_inside(spot, cell, CallArguments::default(), crate::flow::Passing::Through);
                 }
             }

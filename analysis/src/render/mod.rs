@@ -2,6 +2,7 @@
 
 mod flat;
 mod fmea;
+mod graph;
 mod injected;
 mod json;
 mod text;
@@ -34,6 +35,11 @@ pub fn render(table: &FailureTable, format: TableFormat) -> String {
         TableFormat::Markdown => flat::markdown(&flat::rows(table)),
         TableFormat::Html => flat::html("Possible failures", &flat::rows(table)),
     }
+}
+
+/// Returns the program as a picture in SVG: sources of failures, clauses that take them, and tasks.
+pub fn render_graph(table: &FailureTable, title: &str) -> String {
+    graph::render(table, title)
 }
 
 /// Returns the failure modes and effects of a program as a table; as text, that is Markdown. `earlier` is

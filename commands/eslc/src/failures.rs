@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use esl::program;
-use esl_analysis::render::{InjectedOutcomes, TableFormat, render, render_fmea};
-use esl_analysis::{AnalysisOptions, analyze};
+use esl_analysis::render::{InjectedOutcomes, TableFormat, render, render_fmea, render_graph};
+use esl_analysis::{AnalysisOptions, FailureTable, analyze};
 use esl_bytecode::diagnostic::Severity;
 use esl_command as command;
 use esl_command::{NOT_COMPILED, SUCCESS, USAGE};
@@ -57,20 +57,9 @@ enum TableForm {
 
 /// Analyses files and prints the table. Declarations that do not hold are errors.
 pub(crate) fn list_failures(options: &FailureOptions) -> Result<u8, u8> {
-    let sources = read(&options.files)?;
     let compiling = &options.compiling;
-    compiling.warnings.check()?;
-    let line = || "looking for failures".to_string();
-    let mut compiled = command::StatusLine::new(compiling.style.quiet)
-        .during(line, || program::compile_with_core(&sources, &compiling.path(&options.files)));
-    compiling.warnings.apply(&mut compiled);
-    let cores = std::mem::take(&mut compiled.core);
-    if compiled.has_errors() {
-        print_diagnostics(&compiled, &compiling.style);
-        return Err(NOT_COMPILED);
-    }
     let wanted = AnalysisOptions { all: options.all, explained: options.explain.clone() };
-    let (table, explanation) = analyze(cores, &compiled.sources, &wanted);
+    let AnalysedProgram { mut compiled, table, explanation } = analysed(&options.files, compiling, &wanted)?;
     let has_failed = table.findings.iter().any(|found| found.severity == Severity::Error);
     // Warnings of the compiler are those of `eslc check`.
     compiled.diagnostics = table.findings.clone();
@@ -98,6 +87,55 @@ pub(crate) fn list_failures(options: &FailureOptions) -> Result<u8, u8> {
     };
     print(&text)?;
     Ok(if has_failed { NOT_COMPILED } else { SUCCESS })
+}
+
+/// Options of `eslc graph`.
+#[derive(Args)]
+pub(crate) struct GraphOptions {
+    /// Source files, which are looked at as one program; `-` is standard input
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    compiling: SourceOptions,
+}
+
+/// Analyses files and prints the picture of their failures.
+pub(crate) fn draw_graph(options: &GraphOptions) -> Result<u8, u8> {
+    let compiled = analysed(&options.files, &options.compiling, &AnalysisOptions::default())?;
+    let names: Vec<String> = options.files.iter().map(|file| file.display().to_string()).collect();
+    print(&render_graph(&compiled.table, &names.join(", ")))?;
+    Ok(SUCCESS)
+}
+
+/// An analysed program.
+struct AnalysedProgram {
+    compiled: program::Compiled,
+    table: FailureTable,
+    explanation: String,
+}
+
+/// Compiles and analyses files.
+///
+/// # Errors
+/// The exit status, after the messages of the compiler.
+fn analysed(
+    files: &[PathBuf],
+    compiling: &SourceOptions,
+    wanted: &AnalysisOptions,
+) -> Result<AnalysedProgram, u8> {
+    let sources = read(files)?;
+    compiling.warnings.check()?;
+    let line = || "looking for failures".to_string();
+    let mut compiled = command::StatusLine::new(compiling.style.quiet)
+        .during(line, || program::compile_with_core(&sources, &compiling.path(files)));
+    compiling.warnings.apply(&mut compiled);
+    let cores = std::mem::take(&mut compiled.core);
+    if compiled.has_errors() {
+        print_diagnostics(&compiled, &compiling.style);
+        return Err(NOT_COMPILED);
+    }
+    let (table, explanation) = analyze(cores, &compiled.sources, wanted);
+    Ok(AnalysedProgram { compiled, table, explanation })
 }
 
 /// Reads a file.

@@ -7,6 +7,7 @@ mod failures;
 mod format;
 mod import;
 mod new;
+mod rights;
 mod warnings;
 
 use std::collections::HashSet;
@@ -23,9 +24,10 @@ use esl_command::{FAILED, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain};
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_language_server::ClientExit;
 
-use failures::{FailureOptions, list_failures};
+use failures::{FailureOptions, GraphOptions, draw_graph, list_failures};
 use format::{FormatOptions, format_files};
 use import::{ImportOptions, import_tree};
+use rights::{NeededRightsOptions, list_rights};
 use warnings::WarningOptions;
 
 /// The answer to `--version`.
@@ -147,6 +149,24 @@ enum EslcAction {
         #[command(flatten)]
         compiling: SourceOptions,
     },
+    /// List the least rights that a program needs
+    ///
+    /// Prints a flag of `eslvm run` a line, which is a file for its option `--rights`: the objects that calls
+    /// name by constants. Comments tell of calls whose objects are computed. Each call in the text counts,
+    /// whether or not it is ever made.
+    Rights {
+        #[command(flatten)]
+        options: NeededRightsOptions,
+    },
+    /// Draw the failures of a program as a picture
+    ///
+    /// Prints a drawing in SVG: on the left the functions in which failures begin, in the middle the clauses
+    /// that take them, on the right the tasks, and an arrow for each failure that a clause takes, or that
+    /// ends a task. Modules that come with the system are left out.
+    Graph {
+        #[command(flatten)]
+        options: GraphOptions,
+    },
     /// List possible failures, the clauses that take them, and those that reach the top
     ///
     /// For each task and function: the causes of the failures that can leave it, where these begin,
@@ -232,6 +252,8 @@ pub fn main() -> ExitCode {
         EslcAction::Check { files, compiling } => check(&files, &compiling),
         EslcAction::Disasm { file, compiling } => disassemble(&file, &compiling),
         EslcAction::Format { options, modules } => Ok(format_files(&options, &modules.library)),
+        EslcAction::Rights { options } => list_rights(&options),
+        EslcAction::Graph { options } => draw_graph(&options),
         EslcAction::Failures { options } => list_failures(&options),
         EslcAction::Import { options } => Ok(import_tree(&options)),
         EslcAction::New { name } => Ok(new::new_project(&name)),

@@ -45,6 +45,34 @@ fn possible_failures_are_listed() {
 }
 
 #[test]
+fn the_picture_shows_failures_and_clauses() {
+    let folder = Folder::with("failing-graph", &[("mission.esl", MISSION)]);
+    let (status, output, errors) = run(&folder, &["graph", "mission.esl"]);
+    assert_eq!(status, Some(0), "{errors}");
+    assert!(output.starts_with("<svg ") && output.ends_with("</svg>\n"), "{output}");
+    assert!(output.contains(">:lost</text>") && output.contains("class=\"takes\""), "{output}");
+}
+
+#[test]
+fn rights_are_listed_with_those_that_are_not_known() {
+    let text = "(require :sockets)
+        (require :process)
+        (require :http)
+        (defun talk (port)
+          (sockets:with-socket (link (sockets:connect \"127.0.0.1\" port)) (read-line link)))
+        (defun ask (host) (http:get (format nil \"http://~a/\" host)))
+        (process:run-program '(\"calibrate\" \"--fast\"))
+        (http:get \"https://lab/state\")
+        (with-open-file (log \"/var/log/rover\" :direction :output) (print (talk 7) log))
+        (with-open-file (log \"notes.txt\") (read-line log))";
+    let folder = Folder::with("failing-rights", &[("rover.esl", text)]);
+    let (status, output, errors) = run(&folder, &["rights", "rover.esl"]);
+    let expected = "--allow-net=127.0.0.1\n--allow-net=lab:443\n--allow-run=calibrate\n--allow-write=/var/log/rover\n\
+                    # not known: --allow-net, for http:get at rover.esl:6:27\n";
+    assert_eq!((status, output.as_str()), (Some(0), expected), "{errors}");
+}
+
+#[test]
 fn severities_and_notes_are_carried_over() {
     let notes = "item,failure mode,severity,notes\ndrive,:lost,1,look at it\ndrive,:gone,2,old\n";
     let folder = Folder::with("failing-notes", &[("mission.esl", MISSION), ("notes.csv", notes)]);

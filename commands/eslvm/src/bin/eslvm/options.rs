@@ -141,8 +141,8 @@ pub(crate) enum EslvmAction {
     ///
     /// Each test (`deftest`) runs in a machine of its own, whose clock is virtual. Exit status: 0 all
     /// passed; 1 a test failed, or with --inject a run was bad; 2 wrong usage, or a file that cannot be read
-    /// or written; 3 a file does not compile or is refused, or has two tests of one name; 5 there was no test to
-    /// run.
+    /// or written; 3 a file does not compile or is refused, or has two tests of one name; 5 there was no test
+    /// to run.
     Test {
         /// Only tests whose names contain this word, in any case
         #[arg(long, value_name = "WORD")]

@@ -1,0 +1,255 @@
+//! The rights that a program needs: calls of functions that reach the outside, with the objects that these
+//! calls name by constants.
+//!
+//! Each call in the text counts, whether or not it is ever made. A function that is passed as a value, or
+//! whose object is computed, is listed as not known. Not here: rights of modules for robots, and of code that
+//! is made at run time.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use esl_bytecode::compile::MODULE_SOURCES;
+use esl_bytecode::datum::DatumKind;
+use esl_bytecode::symbol::Symbol;
+use esl_compiler::core::{Callee, Core, NodeId, NodeKind};
+use esl_compiler::diagnostic::Sources;
+
+/// Object of a call: the positions of the arguments that name it.
+#[derive(Clone, Copy)]
+enum CallObject {
+    /// A host and a port.
+    Address(usize, usize),
+    /// A URL.
+    Url(usize),
+    /// A path or a name.
+    Text(usize),
+    /// A command: a list whose first element is the program.
+    Command(usize),
+    /// A path that is read, or written if the keyword `:direction` says so.
+    File(usize),
+}
+
+/// Package and name of a function, the rights that it needs, and their object.
+type RightsRow = (&'static str, &'static str, &'static [&'static str], CallObject);
+
+const ROWS: &[RightsRow] = &[
+    ("SOCKETS", "CONNECT", &["net"], CallObject::Address(0, 1)),
+    ("SOCKETS", "LISTEN", &["net"], CallObject::Address(0, 1)),
+    ("SOCKETS", "UDP-OPEN", &["net"], CallObject::Address(0, 1)),
+    ("SOCKETS", "UDP-SEND", &["net"], CallObject::Address(1, 2)),
+    ("SOCKETS", "CONNECT-UNIX", &["read", "write"], CallObject::Text(0)),
+    ("SOCKETS", "LISTEN-UNIX", &["read", "write"], CallObject::Text(0)),
+    ("PROCESS", "RUN-PROGRAM", &["run"], CallObject::Command(0)),
+    ("PROCESS", "LAUNCH-PROGRAM", &["run"], CallObject::Command(0)),
+    ("HTTP", "REQUEST", &["net"], CallObject::Url(1)),
+    ("HTTP", "GET", &["net"], CallObject::Url(0)),
+    ("HTTP", "POST", &["net"], CallObject::Url(0)),
+    ("HTTP", "PUT", &["net"], CallObject::Url(0)),
+    ("HTTP", "DELETE", &["net"], CallObject::Url(0)),
+    ("HTTP", "SERVE", &["net"], CallObject::Address(0, 1)),
+    ("WS", "CALL-WITH-CONNECTION", &["net"], CallObject::Url(1)),
+    ("MQTT", "CALL-WITH-CLIENT", &["net"], CallObject::Address(1, 2)),
+    ("SERIAL", "OPEN-SERIAL-PORT", &["serial"], CallObject::Text(0)),
+    ("OS", "GETENV", &["env"], CallObject::Text(0)),
+    ("LOG", "TO-FILE", &["write"], CallObject::Text(0)),
+    ("COMMON-LISP", "OPEN", &[], CallObject::File(0)),
+    ("COMMON-LISP", "LOAD", &["read"], CallObject::Text(0)),
+    ("COMMON-LISP", "PROBE-FILE", &["read"], CallObject::Text(0)),
+    ("COMMON-LISP", "DIRECTORY", &["read"], CallObject::Text(0)),
+    ("COMMON-LISP", "FILE-WRITE-DATE", &["read"], CallObject::Text(0)),
+    ("COMMON-LISP", "DELETE-FILE", &["write"], CallObject::Text(0)),
+    ("COMMON-LISP", "RENAME-FILE", &["write"], CallObject::Text(0)),
+    ("COMMON-LISP", "ENSURE-DIRECTORIES-EXIST", &["write"], CallObject::Text(0)),
+    ("ESL", "WATCH-PATH", &["read"], CallObject::Text(0)),
+];
+
+/// Packages of modules whose rights are not known.
+const OTHERS: [&str; 5] = ["ROS", "ZENOH", "MAVLINK", "MCAP", "FLEET"];
+
+/// The rights that a program needs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NeededRights {
+    /// Flags of the commands, in order.
+    pub flags: BTreeSet<String>,
+    /// Texts about rights whose objects are not known.
+    pub unknown: BTreeSet<String>,
+}
+
+impl NeededRights {
+    /// Returns the rights as a file for `--rights`: a flag a line, and comments.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        // Writing to a text does not fail.
+        self.flags.iter().for_each(|flag| _ = writeln!(text, "{flag}"));
+        self.unknown.iter().for_each(|line| _ = writeln!(text, "# not known: {line}"));
+        text
+    }
+}
+
+/// Returns the rights that a program needs, from its top-level forms and their sources.
+pub fn needed_rights(cores: &[Core], sources: &Sources) -> NeededRights {
+    let mut needed = NeededRights::default();
+    for core in cores {
+        for node in &core.nodes {
+            let source = sources.name(node.span.source).unwrap_or_default();
+            if source.starts_with(MODULE_SOURCES) {
+                continue;
+            }
+            let place = || match sources.place(node.span) {
+                Some(place) => format!("{source}:{}:{}", place.line, place.column),
+                None => source.to_string(),
+            };
+            match &node.kind {
+                NodeKind::Call(callee, arguments) => {
+                    if let Some(symbol) = symbol_of(callee) {
+                        add_call(core, &symbol, Some(arguments), &place, &mut needed);
+                    }
+                }
+                NodeKind::Apply(callee, _) => {
+                    if let Some(symbol) = symbol_of(callee) {
+                        add_call(core, &symbol, None, &place, &mut needed);
+                    }
+                }
+                NodeKind::FunctionRef(symbol) => add_call(core, symbol, None, &place, &mut needed),
+                NodeKind::BuiltinRef(builtin) => {
+                    add_call(core, &builtin.symbol(), None, &place, &mut needed);
+                }
+                _ => {}
+            }
+        }
+    }
+    needed
+}
+
+fn symbol_of(callee: &Callee) -> Option<Symbol> {
+    match callee {
+        Callee::Global(symbol) => Some(symbol.clone()),
+        Callee::Builtin(builtin) => Some(builtin.symbol()),
+        Callee::Local(_) | Callee::Value(_) => None,
+    }
+}
+
+/// Adds the rights of a call, or of a function whose arguments are not known.
+fn add_call(
+    core: &Core,
+    symbol: &Symbol,
+    arguments: Option<&Vec<NodeId>>,
+    place: &dyn Fn() -> String,
+    needed: &mut NeededRights,
+) {
+    if let Some(package) = OTHERS.iter().find(|package| symbol.is_in(package)) {
+        let line = format!("rights of the module {}", package.to_lowercase());
+        _ = needed.unknown.insert(line);
+        return;
+    }
+    let row = ROWS.iter().find(|(package, name, ..)| symbol.name() == *name && symbol.is_in(package));
+    let Some((package, name, rights, object)) = row else { return };
+    let text = |position: usize| {
+        let node = arguments?.get(position)?;
+        constant_text(core, *node)
+    };
+    let (rights, found) = match *object {
+        CallObject::Address(host, port) => {
+            let address = text(host).map(|host| match text(port) {
+                Some(port) => format!("{host}:{port}"),
+                None => host,
+            });
+            (rights.to_vec(), address)
+        }
+        CallObject::Url(position) => (rights.to_vec(), text(position).and_then(|url| address_of(&url))),
+        CallObject::Text(position) => (rights.to_vec(), text(position)),
+        CallObject::Command(position) => {
+            let node = arguments.and_then(|arguments| arguments.get(position));
+            (rights.to_vec(), node.and_then(|node| program_of(core, *node)))
+        }
+        CallObject::File(position) => (directions(core, arguments), text(position)),
+    };
+    for right in rights {
+        match &found {
+            Some(path) if matches!(right, "read" | "write") && is_below_here(path) => {}
+            Some(object) => _ = needed.flags.insert(format!("--allow-{right}={object}")),
+            None => {
+                let function = match *package {
+                    "COMMON-LISP" | "ESL" => name.to_lowercase(),
+                    package => format!("{package}:{name}").to_lowercase(),
+                };
+                let line = format!("--allow-{right}, for {function} at {}", place());
+                _ = needed.unknown.insert(line);
+            }
+        }
+    }
+}
+
+/// Returns a constant as a text: a string, or the digits of an integer.
+fn constant_text(core: &Core, node: NodeId) -> Option<String> {
+    match &core.nodes[node.index()].kind {
+        NodeKind::Constant(datum) => match datum.kind() {
+            DatumKind::String(text) => Some(text.to_string()),
+            DatumKind::Integer(number) => Some(number.to_string()),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Returns the program of a command that a node names: the first of a quoted list, or of a call of `list`.
+fn program_of(core: &Core, node: NodeId) -> Option<String> {
+    match &core.nodes[node.index()].kind {
+        NodeKind::Constant(datum) => match datum.elements().next()?.kind() {
+            DatumKind::String(text) => Some(text.to_string()),
+            _ => None,
+        },
+        NodeKind::Call(callee, items) => {
+            let symbol = symbol_of(callee)?;
+            let is_list = symbol.is_cl("LIST") || symbol.is_cl("LIST*") || symbol.is_cl("CONS");
+            is_list.then(|| constant_text(core, *items.first()?))?
+        }
+        _ => None,
+    }
+}
+
+/// Returns the rights for a call of `open`.
+fn directions(core: &Core, arguments: Option<&Vec<NodeId>>) -> Vec<&'static str> {
+    let Some(arguments) = arguments else { return vec!["read", "write"] };
+    let keyword = |node: &NodeId| match &core.nodes[node.index()].kind {
+        NodeKind::Constant(datum) => datum.as_symbol().filter(|symbol| symbol.is_keyword()).cloned(),
+        _ => None,
+    };
+    let is_direction = |node: &NodeId| keyword(node).is_some_and(|key| key.name() == "DIRECTION");
+    let Some(position) = arguments.iter().position(is_direction) else { return vec!["read"] };
+    let direction = arguments.get(position + 1).and_then(keyword);
+    match direction.as_ref().map(Symbol::name) {
+        Some("INPUT" | "PROBE") => vec!["read"],
+        Some("OUTPUT") => vec!["write"],
+        _ => vec!["read", "write"],
+    }
+}
+
+/// Returns host and port of a URL.
+fn address_of(url: &str) -> Option<String> {
+    let (scheme, rest) = url.split_once("://")?;
+    let end = rest.find(['/', '?', '#']).unwrap_or(rest.len());
+    let host = rest[..end].rsplit('@').next()?;
+    let has_port = host.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
+    let port = if matches!(scheme, "https" | "wss") { 443 } else { 80 };
+    Some(if has_port { host.to_string() } else { format!("{host}:{port}") })
+}
+
+/// Returns whether a path is below the folder in which the program is started, which needs no right.
+fn is_below_here(path: &str) -> bool {
+    !path.starts_with(['/', '~']) && !path.split('/').any(|part| part == "..")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn urls_and_paths_are_understood() {
+        assert_eq!(address_of("http://lab/x?y").as_deref(), Some("lab:80"));
+        assert_eq!(address_of("wss://u:p@lab:8443/x").as_deref(), Some("lab:8443"));
+        assert_eq!(address_of("https://lab").as_deref(), Some("lab:443"));
+        assert_eq!(address_of("lab"), None);
+        assert!(is_below_here("log/today.txt") && !is_below_here("../x") && !is_below_here("/etc/x"));
+    }
+}
