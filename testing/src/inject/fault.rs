@@ -316,7 +316,7 @@ mod tests {
         assert_eq!(spread(&items, 3), [1, 5, 10]);
         assert_eq!(spread(&items, 1), [1]);
         assert_eq!(spread(&items, 10), items);
-        assert_eq!(spread(&items[..0], 3), []);
+        assert!(spread(&items[..0], 3).is_empty());
     }
 
     #[test]
