@@ -12,6 +12,7 @@ pub mod datum;
 pub mod diagnostic;
 pub mod disasm;
 pub mod file;
+pub mod integer;
 pub mod kind;
 pub mod link;
 pub mod locals;
@@ -29,6 +30,7 @@ pub mod verify;
 pub mod word;
 
 pub use bytes::Bytes;
+pub use integer::Integer;
 pub use num_bigint::BigInt;
 
 /// The example of the README, compiled and run.

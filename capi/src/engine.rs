@@ -11,9 +11,10 @@ use crate::border::{guarded, hand, look, store, take, text};
 use crate::config::{Memory, Settings, esl_config};
 use crate::failure::{Fault, esl_failure};
 use crate::fork::Process;
+use crate::listed::copies;
 use crate::reply::{AwaitedAnswer, esl_reply};
 use crate::status::esl_status::{self, ESL_BUSY, ESL_DIVERGED, ESL_PANIC};
-use crate::value::{esl_value, values};
+use crate::value::esl_value;
 use crate::wakeup::Wakeup;
 
 /// A machine in which programs run. It serves one thread at a time; a call while another one is under way
@@ -263,7 +264,7 @@ pub unsafe extern "C" fn esl_call(
     // SAFETY: each pointer is null, or to what C holds and lends.
     unsafe {
         evaluate(engine, value, failure, |engine| {
-            let (function, arguments) = (text(function, "name of the function")?, values(arguments, count)?);
+            let (function, arguments) = (text(function, "name of the function")?, copies(arguments, count)?);
             Ok(engine.call(function, arguments))
         })
     }

@@ -8,8 +8,9 @@ use esl::host::{FailureFrame, SendError};
 use esl::{Data, Error};
 
 use crate::border::{freeing, look, making, store, take, text};
+use crate::listed::values;
 use crate::status::esl_status::{self, ESL_FAILED};
-use crate::value::{esl_value, values};
+use crate::value::esl_value;
 
 /// Why a call has not done what it says.
 ///

@@ -118,7 +118,17 @@ fn call_function(
     user: &UserData,
     call: &Call,
 ) -> Result<Data, Failure> {
-    let arguments = argument_pointers(call.arguments());
+    // Most calls have few arguments, whose pointers need no memory of their own.
+    let (mut few, many): ([*const esl_value; 8], Vec<*const esl_value>);
+    let pointers = call.arguments().iter().map(|argument| ptr::from_ref(argument).cast());
+    let arguments = if pointers.len() <= 8 {
+        few = [ptr::null(); 8];
+        few.iter_mut().zip(pointers).for_each(|(place, pointer)| *place = pointer);
+        &few[..call.arguments().len()]
+    } else {
+        many = pointers.collect();
+        &many
+    };
     let mut result: *mut esl_value = ptr::null_mut();
     // SAFETY: the embedder has given the function for this pointer; the arguments live until it returns.
     let failure = unsafe { function(user.pointer, arguments.as_ptr(), arguments.len(), &raw mut result) };
@@ -128,9 +138,4 @@ fn call_function(
         (Some(failure), _) => Err(failure.to_engine()),
         (None, result) => Ok(result.map_or(Data::Nil, |value| value.0)),
     }
-}
-
-/// Returns pointers to arguments, which are values of C as they are.
-pub(crate) fn argument_pointers(arguments: &[Data]) -> Vec<*const esl_value> {
-    arguments.iter().map(|argument| ptr::from_ref(argument).cast()).collect()
 }

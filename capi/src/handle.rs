@@ -10,9 +10,10 @@ use esl::host::ProcessSignal;
 use crate::border::{freeing, give, guarded, hand, look, look_within, making, take, text};
 use crate::engine::esl_engine;
 use crate::failure::esl_failure;
+use crate::listed::values;
 use crate::reply::{AwaitedAnswer, esl_reply};
 use crate::status::esl_status;
-use crate::value::{esl_value, values};
+use crate::value::esl_value;
 
 /// A way into a run, from all threads at the same time. While a program has a handle, it waits for what may
 /// come by it instead of being deadlocked.

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | `border` | pointers from C, objects for C, panics |
 //! | `status`, `failure` | the outcome of a call, and its reason |
-//! | `value`, `json`, `object` | values of programs; their texts in JSON; objects of C among them |
+//! | `value`, `listed`, `json`, `object` | values of programs; lists of them from C; their texts in JSON; objects of C among them |
 //! | `config`, `engine` | engines: limits, rights, evaluation, the loop |
 //! | `program` | definitions of a program, patches, watched facts |
 //! | `function`, `operation` | functions and operations that C implements |
@@ -30,6 +30,7 @@ mod fork;
 pub mod function;
 pub mod handle;
 pub mod json;
+mod listed;
 pub mod object;
 pub mod observer;
 pub mod operation;

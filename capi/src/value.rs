@@ -10,6 +10,7 @@ use crate::border::{
     elements, free_text, freeing, give_text, guarded, hand, look_within, making, store, take, text,
 };
 use crate::failure::{Fault, c_text, esl_failure};
+use crate::listed::values;
 use crate::status::esl_status::{self, ESL_NOT_OF_TYPE};
 
 /// A value from a program, or for one: numbers, texts, symbols, lists, vectors.
@@ -64,20 +65,6 @@ pub enum esl_kind {
 }
 
 use esl_kind::*;
-
-/// Copies the values that C lists.
-///
-/// # Safety
-/// `values` is null, or points to `count` values.
-pub(crate) unsafe fn values(values: *const *const esl_value, count: usize) -> Result<Vec<Data>, Fault> {
-    let mut copies = Vec::with_capacity(count.min(1024));
-    // SAFETY: each pointer is null, or to what C holds and lends.
-    for &value in unsafe { elements(values, count, "values") }? {
-        // SAFETY: each pointer is null, or to what C holds and lends.
-        copies.push(unsafe { look_within(value) }?.0.clone());
-    }
-    Ok(copies)
-}
 
 /// Creates `NIL`. From any thread, as all functions for values.
 #[unsafe(no_mangle)]

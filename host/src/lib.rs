@@ -79,7 +79,7 @@ pub use real_files::request_of_files;
 pub use record::{Intent, NotedRecord, QuestionHash, Record, Recorder, Recording, RecordingHost};
 pub use replay::{Divergence, ReplayHost};
 pub use rights::{Permit, Right, Rights};
-pub use sender::{SendError, Sender};
+pub use sender::{SendError, Sender, SenderInput};
 pub use signal::ProcessSignal;
 pub use survey::{
     FailureFrame, FailureRow, FrameRow, FrameVariable, InputRow, Inspection, Lateness, LockRow, RelationRow,

@@ -6,7 +6,8 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::task::{Poll, Waker};
 
 use esl_bytecode::datum::Datum;
@@ -38,20 +39,49 @@ impl fmt::Display for SendError {
 
 impl std::error::Error for SendError {}
 
-/// The state of one input, as senders see it.
-#[derive(Debug, Default)]
+/// The state of one input, as senders see it. Changed under the lock of the table, except by senders that
+/// know the input, which only add to `sent`.
+#[derive(Debug)]
 struct InputAdmission {
-    /// Number of signals for which there is room, if senders wait.
-    capacity: Option<usize>,
+    /// Number of signals for which there is room; `usize::MAX` if senders do not wait.
+    capacity: AtomicUsize,
     /// Signals that the input keeps.
-    kept: usize,
+    kept: AtomicUsize,
     /// Signals on their way to it.
-    sent: usize,
+    sent: AtomicUsize,
+    /// Whether the program has removed the input, or the machine is gone.
+    is_gone: AtomicBool,
+}
+
+impl InputAdmission {
+    fn new(capacity: Option<usize>) -> InputAdmission {
+        InputAdmission {
+            capacity: AtomicUsize::new(capacity.unwrap_or(usize::MAX)),
+            kept: AtomicUsize::new(0),
+            sent: AtomicUsize::new(0),
+            is_gone: AtomicBool::new(false),
+        }
+    }
+
+    /// Counts a signal that may be sent to the input. Returns whether there is room for it.
+    fn admit(&self, limit: usize) -> bool {
+        // The numbers guard no other memory: the signal itself comes by the inbox.
+        let (capacity, kept) = (self.capacity.load(Ordering::Relaxed), self.kept.load(Ordering::Relaxed));
+        let most = capacity.saturating_sub(kept).min(limit);
+        let count = |sent: usize| (sent < most).then_some(sent + 1);
+        self.sent.fetch_update(Ordering::Relaxed, Ordering::Relaxed, count).is_ok()
+    }
+
+    /// Notes that a signal that was sent has come.
+    fn note_arrival(&self) {
+        let less = |sent: usize| Some(sent.saturating_sub(1));
+        _ = self.sent.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
+    }
 }
 
 #[derive(Default)]
 struct AdmissionTable {
-    inputs: BTreeMap<String, InputAdmission>,
+    inputs: BTreeMap<String, Arc<InputAdmission>>,
     /// Drivers that wait for room.
     wakers: Vec<Waker>,
     /// Number of threads that wait for room. A notification without waiters is a call of the system too.
@@ -73,13 +103,15 @@ impl AdmissionTable {
         if self.is_closed {
             return Err(SendError::Ended);
         }
-        let Some(input) = self.inputs.get_mut(name) else { return Err(SendError::NoSuchInput(name.into())) };
-        let has_room = input.capacity.is_none_or(|capacity| input.kept + input.sent < capacity);
-        if !has_room || limit.is_some_and(|limit| input.sent >= limit) {
-            return Err(SendError::Full(name.into()));
+        let Some(input) = self.inputs.get(name) else { return Err(SendError::NoSuchInput(name.into())) };
+        if input.admit(limit.unwrap_or(usize::MAX)) { Ok(()) } else { Err(SendError::Full(name.into())) }
+    }
+
+    /// Has senders that know an input look for it anew.
+    fn forget(&mut self, name: &str) {
+        if let Some(input) = self.inputs.remove(name) {
+            input.is_gone.store(true, Ordering::Relaxed);
         }
-        input.sent += 1;
-        Ok(())
     }
 }
 
@@ -97,9 +129,9 @@ impl Admission {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn change(&self, name: &str, change: impl FnOnce(&mut InputAdmission)) {
+    fn change(&self, name: &str, change: impl FnOnce(&InputAdmission)) {
         self.change_table(|table| {
-            if let Some(input) = table.inputs.get_mut(name) {
+            if let Some(input) = table.inputs.get(name) {
                 change(input);
             }
         });
@@ -158,32 +190,37 @@ impl Inbox {
     /// Says that there is an input of this name; with a capacity, if senders wait when it is full.
     #[doc(hidden)]
     pub fn open_input(&self, name: &str, capacity: Option<usize>) {
-        self.admission().state().inputs.entry(name.into()).or_default().capacity = capacity;
-        self.admission().change(name, |_| {});
+        self.admission().change_table(|table| match table.inputs.get(name) {
+            Some(input) => input.capacity.store(capacity.unwrap_or(usize::MAX), Ordering::Relaxed),
+            None => _ = table.inputs.insert(name.into(), Arc::new(InputAdmission::new(capacity))),
+        });
     }
 
     /// Says that the input is no more.
     #[doc(hidden)]
     pub fn remove_input(&self, name: &str) {
-        self.admission().change_table(|table| _ = table.inputs.remove(name));
+        self.admission().change_table(|table| table.forget(name));
     }
 
     /// Says that a signal that was sent to the input has come.
     #[doc(hidden)]
     pub fn note_arrival(&self, name: &str) {
-        self.admission().change(name, |input| input.sent = input.sent.saturating_sub(1));
+        self.admission().change(name, InputAdmission::note_arrival);
     }
 
     /// Says how many signals the input keeps.
     #[doc(hidden)]
     pub fn note_kept(&self, name: &str, kept: usize) {
-        self.admission().change(name, |input| input.kept = kept);
+        self.admission().change(name, |input| input.kept.store(kept, Ordering::Relaxed));
     }
 
     /// Says that the machine is gone.
     #[doc(hidden)]
     pub fn close_inputs(&self) {
-        self.admission().change_table(|table| table.is_closed = true);
+        self.admission().change_table(|table| {
+            table.is_closed = true;
+            table.inputs.values().for_each(|input| input.is_gone.store(true, Ordering::Relaxed));
+        });
     }
 }
 
@@ -244,6 +281,79 @@ impl Sender {
         self.inbox().put(Incoming::Message { input: input.into(), arguments });
         Ok(())
     }
+
+    /// Returns an input, by its name in any case, for many signals.
+    pub fn input(&self, name: &str) -> SenderInput {
+        SenderInput { sender: self.clone(), name: name.to_uppercase().into(), known: OnceLock::new() }
+    }
+}
+
+/// An input of a program as a sender has it: its signals need no look-up of the name, and no lock of the
+/// table of inputs while there is room.
+#[derive(Clone)]
+pub struct SenderInput {
+    sender: Sender,
+    name: Arc<str>,
+    /// The state of the input, as it was found first: the program may have removed it since.
+    known: OnceLock<Arc<InputAdmission>>,
+}
+
+impl fmt::Debug for SenderInput {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("SenderInput").field(&self.name).finish()
+    }
+}
+
+impl SenderInput {
+    /// Returns the name, in upper case.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Signals the input, as [`Sender::signal`].
+    ///
+    /// # Errors
+    /// As that.
+    pub fn signal(&self, arguments: Vec<Datum>) -> Result<(), SendError> {
+        self.send(arguments, true)
+    }
+
+    /// Signals the input, as [`Sender::try_signal`].
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn try_signal(&self, arguments: Vec<Datum>) -> Result<(), SendError> {
+        self.send(arguments, false)
+    }
+
+    /// Counts a signal without waiting, if there is room for it. Returns whether there is: then
+    /// [`SenderInput::signal_admitted`] sends the signal.
+    pub fn admit(&self) -> bool {
+        let known = self.known.get().filter(|known| !known.is_gone.load(Ordering::Relaxed));
+        if let Some(known) = known {
+            return known.admit(usize::MAX);
+        }
+        let admission = self.sender.inbox().admission();
+        if self.known.get().is_none()
+            && let Some(found) = admission.state().inputs.get(&*self.name)
+        {
+            _ = self.known.set(found.clone());
+        }
+        admission.admit(&self.name, false).is_ok()
+    }
+
+    /// Sends a signal that [`SenderInput::admit`] has counted.
+    pub fn signal_admitted(&self, arguments: Vec<Datum>) {
+        self.sender.inbox().put(Incoming::Message { input: self.name.clone(), arguments });
+    }
+
+    fn send(&self, arguments: Vec<Datum>, waits: bool) -> Result<(), SendError> {
+        if !self.admit() {
+            self.sender.inbox().admission().admit(&self.name, waits)?;
+        }
+        self.signal_admitted(arguments);
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -265,6 +375,26 @@ mod tests {
         assert_eq!(outcome("go"), Ok(()));
         inbox.close_inputs();
         assert_eq!(outcome("go"), Err(SendError::Ended));
+    }
+
+    #[test]
+    fn an_input_that_is_known_is_refused_like_any() {
+        let inbox = Inbox::new();
+        let input = Sender::new(&inbox).input("go");
+        assert_eq!(input.try_signal(Vec::new()), Err(SendError::NoSuchInput("GO".into())));
+        inbox.open_input("GO", Some(1));
+        assert_eq!(input.try_signal(Vec::new()), Ok(()));
+        assert_eq!(input.try_signal(Vec::new()), Err(SendError::Full("GO".into())));
+        inbox.open_input("GO", Some(2));
+        assert_eq!(input.try_signal(Vec::new()), Ok(()));
+        inbox.remove_input("GO");
+        assert_eq!(input.try_signal(Vec::new()), Err(SendError::NoSuchInput("GO".into())));
+        // Another one of the name.
+        inbox.open_input("GO", Some(1));
+        let again = [input.try_signal(Vec::new()), input.try_signal(Vec::new())];
+        assert_eq!(again, [Ok(()), Err(SendError::Full("GO".into()))]);
+        inbox.close_inputs();
+        assert_eq!(input.try_signal(Vec::new()), Err(SendError::Ended));
     }
 
     #[test]

@@ -19,7 +19,7 @@
 import os
 
 from . import _esl
-from ._esl import Handle, ProgramObject, Recording
+from ._esl import Handle, Input, ProgramObject, Recording
 from .display import Event, TaskInfo, Tasks, Timeline
 from .engine import Definition, Engine
 from .errors import (
@@ -40,7 +40,7 @@ from .errors import (
     Place,
     Stopped,
 )
-from .facts import FactChange, Facts, Input, Inputs, Subscription
+from .facts import FactChange, Facts, Inputs, Subscription
 from .program import Replay, RunResult, check, check_file, replay, run
 from .values import Character, Dotted, Keyword, Object, Symbol, Table
 

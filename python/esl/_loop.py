@@ -140,6 +140,9 @@ class Loop:
 
         def ended(task: asyncio.Task[Any]) -> None:
             self._tasks.discard(task)
+            # The machine is polled below, so its end of the operation need not wake the loop.
+            if not self._is_closed:
+                self._machine.unwatch_wakeup()
             if task.cancelled():
                 operation.drop()
             elif (error := task.exception()) is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING, Any, AsyncIterator, Callable, Iterator, NamedTuple
 
-from . import _esl
+from ._esl import Input
 from .errors import Ended
 
 if TYPE_CHECKING:
@@ -84,25 +84,6 @@ class Facts:
                 yield await changes.get()
 
 
-class Input:
-    """An input of a program. Its signals come from any thread."""
-
-    def __init__(self, handle: _esl.Handle, name: str) -> None:
-        self._handle = handle
-        self.name = name
-
-    def signal(self, *arguments: Any) -> None:
-        """Signals the input. Waits while it is full, if that is its rule: so not on the thread of the engine."""
-        self._handle.signal(self.name, *arguments)
-
-    def try_signal(self, *arguments: Any) -> None:
-        """Signals the input, and raises `Full` instead of waiting."""
-        self._handle.try_signal(self.name, *arguments)
-
-    def __repr__(self) -> str:
-        return f"Input({self.name!r})"
-
-
 class Inputs:
     """The inputs of a program, by their names: engine.inputs["scan"]. They keep the program waiting for signals. To
     iterate yields the names of those that the program has defined."""
@@ -111,7 +92,7 @@ class Inputs:
         self._engine = engine
 
     def __getitem__(self, name: str) -> Input:
-        return Input(self._engine._kept_handle(), name)
+        return self._engine._kept_handle().input(name)
 
     def __iter__(self) -> Iterator[str]:
         rows = self._engine.definitions()

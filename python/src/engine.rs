@@ -1,15 +1,12 @@
 //! Engines, and driving them until an answer has come.
 
 use std::collections::HashSet;
-use std::io::{self, Read, Write};
 use std::ops::{Deref, DerefMut};
-use std::os::fd::AsRawFd;
-use std::os::unix::net::UnixStream;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
-use std::task::{Wake, Waker};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
+use std::task::Waker;
 use std::time::{Duration, Instant};
 
-use esl::engine::{Ending, Poll, ProgramDefinition};
+use esl::engine::{BegunCall, Ending, Poll, ProgramDefinition};
 use esl::host::{RealHost, Right, Rights};
 use esl::{Config, Data, Error};
 use pyo3::exceptions::PyValueError;
@@ -24,6 +21,7 @@ use crate::output::{Output, screen};
 use crate::process::{Process, detached};
 use crate::recording::{Memory, Recording};
 use crate::value::to_python;
+use crate::wakeup::{Bell, Wakeup};
 use crate::watching::{Caller, Observation, Timeline, Watch};
 
 /// Ticks after which signals of the process are looked for.
@@ -34,46 +32,6 @@ const EVALUATED: &str = "<text>";
 
 /// Longest wait until signals of the process are looked for.
 const PAUSE: Duration = Duration::from_millis(50);
-
-/// A bell that wakes the thread that drives an engine.
-#[derive(Default)]
-struct Bell {
-    is_rung: Mutex<bool>,
-    rung: Condvar,
-}
-
-impl Wake for Bell {
-    fn wake(self: Arc<Bell>) {
-        *self.is_rung.lock().unwrap_or_else(PoisonError::into_inner) = true;
-        self.rung.notify_all();
-    }
-}
-
-/// A pair of sockets of which one becomes readable when the engine has something to do, so that an event loop
-/// of Python waits for it. A function of Python would have to wait for the interpreter, under a lock of the
-/// machine.
-struct Wakeup {
-    reader: UnixStream,
-    waker: Waker,
-}
-
-struct WakeupWriter(UnixStream);
-
-impl Wake for WakeupWriter {
-    fn wake(self: Arc<WakeupWriter>) {
-        // A socket that is full is readable already.
-        _ = (&self.0).write(&[1]);
-    }
-}
-
-impl Wakeup {
-    fn new() -> io::Result<Wakeup> {
-        let (reader, writer) = UnixStream::pair()?;
-        reader.set_nonblocking(true)?;
-        writer.set_nonblocking(true)?;
-        Ok(Wakeup { reader, waker: Waker::from(Arc::new(WakeupWriter(writer))) })
-    }
-}
 
 /// A machine in which programs run. It serves one thread at a time.
 #[pyclass(frozen, module = "esl._esl")]
@@ -191,10 +149,7 @@ impl Engine {
     fn wait(&self, engine: &mut esl::Engine, until: Option<Instant>) {
         let left = until.map(|until| until.saturating_duration_since(Instant::now()));
         engine.wake_when_ready(&Waker::from(self.bell.clone()));
-        let is_rung = self.bell.is_rung.lock().unwrap_or_else(PoisonError::into_inner);
-        let wait = left.unwrap_or(PAUSE).min(PAUSE);
-        let waited = self.bell.rung.wait_timeout_while(is_rung, wait, |is_rung| !*is_rung);
-        *waited.unwrap_or_else(PoisonError::into_inner).0 = false;
+        self.bell.wait(left.unwrap_or(PAUSE).min(PAUSE));
     }
 }
 
@@ -314,9 +269,22 @@ impl Engine {
         arguments: &Bound<'py, PyTuple>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let data = all_data(arguments)?;
-        let mut engine = self.lock()?;
-        let reply = engine.handle().call(name, data);
-        self.drive(py, &mut engine, &reply, (EVALUATED, ""))
+        let engine = &mut **self.lock()?;
+        if !matches!(self.memory, Memory::None) {
+            // The call belongs to the recording.
+            let reply = engine.handle().call(name, data);
+            return self.drive(py, engine, &reply, (EVALUATED, ""));
+        }
+        let begun = detached(py, || {
+            let begun = engine.begin_call(name, data, PORTION);
+            engine.flush();
+            begun
+        });
+        match begun {
+            Ok(BegunCall::Ended(data)) => to_python(py, &data),
+            Ok(BegunCall::UnderWay(reply)) => self.drive(py, engine, &reply, (EVALUATED, "")),
+            Err(error) => Err(of_text(py, error, EVALUATED, "")),
+        }
     }
 
     /// Defines a function that programs call and Python implements.
@@ -397,19 +365,25 @@ impl Engine {
         if wakeup.is_none() {
             *wakeup = Some(Wakeup::new()?);
         }
-        Ok(wakeup.as_ref().map_or(-1, |wakeup| wakeup.reader.as_raw_fd()))
+        Ok(wakeup.as_ref().map_or(-1, Wakeup::descriptor))
     }
 
     /// Makes the descriptor unreadable, and readable again when something comes.
     fn watch_wakeup(&self) -> PyResult<()> {
         let engine = self.lock()?;
         let wakeup = self.wakeup.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(Wakeup { reader, waker }) = &*wakeup {
-            let mut bytes = [0; 64];
-            while matches!((&*reader).read(&mut bytes), Ok(count) if count == bytes.len()) {}
-            engine.wake_when_ready(waker);
+        if let Some(wakeup) = &*wakeup {
+            wakeup.empty();
+            engine.wake_when_ready(&wakeup.waker());
         }
         Ok(())
+    }
+
+    /// Has the descriptor stay as it is, whatever comes, until `watch_wakeup`: the caller is about to poll.
+    fn unwatch_wakeup(&self) {
+        if let Ok(engine) = self.lock() {
+            engine.wake_when_ready(Waker::noop());
+        }
     }
 
     /// Ends what still runs: aborts all tasks, runs their cleanups, cancels operations.

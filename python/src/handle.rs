@@ -4,7 +4,7 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
-use esl::engine::{QueryAnswer, TaskHandle};
+use esl::engine::{InputHandle, QueryAnswer, TaskHandle};
 use esl::host::TaskInfo;
 use esl::{Data, Error};
 use pyo3::prelude::*;
@@ -52,6 +52,12 @@ impl Handle {
         self.check_process()?;
         let data = all_data(arguments)?;
         self.inner.try_signal(name, data).map_err(|error| of_send(py, &error))
+    }
+
+    /// Returns an input, by its name in any case, for many signals.
+    fn input(&self, name: &str) -> PyResult<Input> {
+        self.check_process()?;
+        Ok(Input { inner: self.inner.input(name), name: name.to_owned(), process: self.process })
     }
 
     /// Adds a fact. The answer is whether it is new.
@@ -121,6 +127,41 @@ impl Handle {
     /// Has an evaluation of the engine end with `esl.Stopped`. Tasks go on in the next run.
     fn stop(&self) {
         self.inner.stop();
+    }
+}
+
+/// An input of a program. Its signals come from any thread.
+#[pyclass(frozen, module = "esl")]
+pub(crate) struct Input {
+    inner: InputHandle,
+    /// The name as it was given.
+    #[pyo3(get)]
+    name: String,
+    process: Process,
+}
+
+#[pymethods]
+impl Input {
+    /// Signals the input. Waits while it is full, if that is its rule: so not on the thread of the engine.
+    #[pyo3(signature = (*arguments))]
+    fn signal(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<()> {
+        self.process.check()?;
+        // To let go of the interpreter takes longer than the signal, which mostly need not wait.
+        match self.inner.offer(all_data(arguments)?) {
+            Ok(()) => Ok(()),
+            Err(data) => detached(py, || self.inner.signal(data)).map_err(|error| of_send(py, &error)),
+        }
+    }
+
+    /// Signals the input, and raises `esl.Full` instead of waiting.
+    #[pyo3(signature = (*arguments))]
+    fn try_signal(&self, py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<()> {
+        self.process.check()?;
+        self.inner.try_signal(all_data(arguments)?).map_err(|error| of_send(py, &error))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Input('{}')", self.name)
     }
 }
 

@@ -11,6 +11,7 @@
 //! | `program` | whole programs: diagnostics, tests, recordings |
 //! | `recording` | recordings of engines |
 //! | `output` | the output of programs |
+//! | `wakeup` | waking the thread or the event loop that drives an engine |
 //! | `process` | copies of the process |
 //!
 //! Guarantees: the interpreter's lock is released while a machine runs. Exceptions of a callback are failures
@@ -28,6 +29,7 @@ mod process;
 mod program;
 mod recording;
 mod value;
+mod wakeup;
 mod watching;
 
 use pyo3::prelude::*;
@@ -40,7 +42,7 @@ mod _esl {
     #[pymodule_export]
     use super::engine::Engine;
     #[pymodule_export]
-    use super::handle::{Handle, Mailbox, Reply, Task};
+    use super::handle::{Handle, Input, Mailbox, Reply, Task};
     #[pymodule_export]
     use super::process::{note_exit, note_fork};
     #[pymodule_export]

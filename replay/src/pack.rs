@@ -280,7 +280,7 @@ impl<'a> ByteReader<'a> {
                 let id = self.small()?;
                 DatumKind::Symbol(Symbol::uninterned(id, self.text()?))
             }
-            tag::INTEGER => DatumKind::Integer(self.integer()?),
+            tag::INTEGER => DatumKind::Integer(self.integer()?.into()),
             tag::RATIO => {
                 let (over, under) = (self.integer()?, self.integer()?);
                 (under > 1.into()).then_some(DatumKind::Ratio(over, under))?

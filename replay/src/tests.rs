@@ -99,7 +99,7 @@ fn data() -> Vec<Datum> {
     let datum = |kind| Datum::new(kind, Span::default());
     let text = datum(DatumKind::String("ä\"".into()));
     let numbers = [
-        datum(DatumKind::Integer(num_bigint::BigInt::from(-3).pow(99))),
+        datum(DatumKind::Integer(num_bigint::BigInt::from(-3).pow(99).into())),
         datum(DatumKind::Ratio((-1).into(), 3.into())),
         datum(DatumKind::Float(-0.5)),
         datum(DatumKind::Character('λ')),

@@ -41,6 +41,14 @@ pub trait FromData: Sized {
     /// Returns the value that data stand for; `None` if they are of another type.
     fn from_data(data: &Data) -> Option<Self>;
 
+    /// Returns the value that data stand for, made of them; the data if they are of another type.
+    ///
+    /// # Errors
+    /// The data.
+    fn from_own_data(data: Data) -> Result<Self, Data> {
+        Self::from_data(&data).ok_or(data)
+    }
+
     /// Returns the values that the elements of a vector of numbers stand for; `None` if one of them is of
     /// another type. Types whose elements can be copied at once do so.
     fn from_packed(vector: &PackedVector) -> Option<Vec<Self>> {
@@ -170,6 +178,10 @@ impl FromData for Data {
 
     fn from_data(data: &Data) -> Option<Data> {
         Some(data.clone())
+    }
+
+    fn from_own_data(data: Data) -> Result<Data, Data> {
+        Ok(data)
     }
 }
 

@@ -25,6 +25,7 @@ use esl_bytecode::span::{SourceId, Span};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol, USER_PACKAGE};
 use esl_compiler::diagnostic::code;
 use esl_compiler::reader::{BareEnvironment, read_datum};
+use esl_vm::embed::Atom;
 
 use crate::error::Error;
 
@@ -190,6 +191,18 @@ impl Data {
         }
     }
 
+    /// Returns the atom that the value is, if it is one.
+    pub(crate) fn as_atom(&self) -> Option<Atom> {
+        Some(match *self {
+            Data::Nil => Atom::Nil,
+            Data::True => Atom::True,
+            Data::Integer(value) => Atom::Integer(value),
+            Data::Float(value) => Atom::Float(value),
+            Data::Character(value) => Atom::Character(value),
+            _ => return None,
+        })
+    }
+
     pub(crate) fn to_datum(&self, package: &str) -> Datum {
         let span = Span::default();
         let list = |items: &[Data], tail: Datum| {
@@ -199,7 +212,7 @@ impl Data {
             Data::Nil => return Datum::nil(span),
             Data::True => return Datum::symbol(Symbol::cl("T"), span),
             Data::Integer(value) => DatumKind::Integer((*value).into()),
-            Data::BigInteger(value) => DatumKind::Integer(value.clone()),
+            Data::BigInteger(value) => DatumKind::Integer(value.clone().into()),
             Data::Ratio(numerator, denominator) => DatumKind::Ratio(numerator.clone(), denominator.clone()),
             Data::Float(value) => DatumKind::Float(*value),
             Data::Character(value) => DatumKind::Character(*value),
@@ -253,9 +266,9 @@ impl Data {
             DatumKind::Symbol(symbol) if symbol.is_cl("T") => Data::True,
             DatumKind::Symbol(symbol) if symbol.is_keyword() => Data::Keyword(symbol.name().into()),
             DatumKind::Symbol(symbol) => Data::Symbol(name_of(symbol)),
-            DatumKind::Integer(value) => match i64::try_from(value) {
-                Ok(value) => Data::Integer(value),
-                Err(_) => Data::BigInteger(value.clone()),
+            DatumKind::Integer(value) => match value.as_small() {
+                Some(value) => Data::Integer(value),
+                None => Data::BigInteger(value.to_big()),
             },
             DatumKind::Ratio(numerator, denominator) => Data::Ratio(numerator.clone(), denominator.clone()),
             DatumKind::Float(value) => Data::Float(*value),
@@ -281,6 +294,18 @@ impl Data {
                     _ => Data::DottedList(items, Box::new(Data::within(elements.tail(), levels, is_cut))),
                 }
             }
+        }
+    }
+}
+
+impl From<Atom> for Data {
+    fn from(atom: Atom) -> Data {
+        match atom {
+            Atom::Nil => Data::Nil,
+            Atom::True => Data::True,
+            Atom::Integer(value) => Data::Integer(value),
+            Atom::Float(value) => Data::Float(value),
+            Atom::Character(value) => Data::Character(value),
         }
     }
 }

@@ -2,10 +2,13 @@
 
 use std::fmt;
 
+use esl_bytecode::symbol::USER_PACKAGE;
 use esl_host::{FunctionRef, Inbox, Kept};
+use esl_vm::run::CallError;
 use esl_vm::value::Value;
+use esl_vm::vm::Vm;
 
-use super::{Engine, handle};
+use super::{Engine, Reply};
 use crate::data::{Data, FromData};
 use crate::error::Error;
 
@@ -35,11 +38,20 @@ impl fmt::Debug for Function {
 pub trait Callable {
     /// Returns the function, as the machine with this inbox knows it.
     fn callee(&self, inbox: &Inbox) -> FunctionRef;
+
+    /// Returns the name, in any case, if it is called by that.
+    fn name(&self) -> Option<&str> {
+        None
+    }
 }
 
 impl Callable for &str {
     fn callee(&self, _inbox: &Inbox) -> FunctionRef {
         FunctionRef::Named(self.to_uppercase())
+    }
+
+    fn name(&self) -> Option<&str> {
+        Some(self)
     }
 }
 
@@ -47,6 +59,15 @@ impl Callable for &Function {
     fn callee(&self, inbox: &Inbox) -> FunctionRef {
         self.0.callee(inbox)
     }
+}
+
+/// A call after a portion of it.
+#[derive(Debug)]
+pub enum BegunCall<T> {
+    /// It has ended, with this value.
+    Ended(T),
+    /// It goes on in the runs to come.
+    UnderWay(Reply<T>),
 }
 
 impl Engine {
@@ -73,25 +94,105 @@ impl Engine {
         function: impl Callable,
         arguments: impl IntoIterator<Item = Data>,
     ) -> Result<T, Error> {
-        let callee = function.callee(&self.machine.inbox());
-        let Some(function) = self.machine.callee(&callee) else {
-            return Err(Error::NotOfType {
-                value: "a function of another engine".into(),
-                expected: "FUNCTION",
-            });
+        let ticks = self.ticks;
+        let value = self.call_with(&function, arguments, |machine, callee, arguments| {
+            machine.call_for_value(callee, arguments, ticks)
+        });
+        self.machine.flush();
+        self.value_of_call(value?)
+    }
+
+    /// Begins a call of a function of the program, and runs tasks for a portion of ticks, until the call has
+    /// ended or all tasks wait. A call that has not ended goes on in the runs to come, as one by
+    /// [`Handle::call`]; it does not count as a sender for which a program waits. Output of
+    /// the program may be left in its buffer: [`Engine::flush`] writes it.
+    ///
+    /// ```
+    /// use esl::Engine;
+    /// use esl::engine::BegunCall;
+    ///
+    /// let mut engine = Engine::new()?;
+    /// engine.eval("(defun pick (n) (sleep (* n 0.01)) n)")?;
+    /// assert!(matches!(engine.begin_call("pick", [0.into()], 1000)?, BegunCall::Ended(0)));
+    /// let BegunCall::UnderWay(reply) = engine.begin_call::<i64>("pick", [1.into()], 1000)? else {
+    ///     panic!("it sleeps")
+    /// };
+    /// engine.run();
+    /// assert_eq!(reply.wait(), Ok(1));
+    /// # Ok::<(), esl::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Engine::call`].
+    pub fn begin_call<T: FromData>(
+        &mut self,
+        function: impl Callable,
+        arguments: impl IntoIterator<Item = Data>,
+        ticks: u64,
+    ) -> Result<BegunCall<T>, Error> {
+        let begun = self.call_with(&function, arguments, |machine, callee, arguments| {
+            machine.begin_call_for_value(callee, arguments, ticks)
+        })?;
+        match begun {
+            Ok(value) => self.value_of_call(value).map(BegunCall::Ended),
+            Err(pending) => Ok(BegunCall::UnderWay(Reply::of_value(pending))),
+        }
+    }
+
+    /// Returns the value of a call, converted.
+    fn value_of_call<T: FromData>(&mut self, value: Value) -> Result<T, Error> {
+        let data = match self.machine.export_atom(value) {
+            Some(atom) => atom.into(),
+            None => Data::whole(&self.machine.export(value)?)?,
         };
-        let mut values: Vec<Value> = vec![function];
-        self.machine.pin(function);
-        for datum in handle::data(arguments) {
-            let Ok(value) = self.machine.import(&datum) else { break };
+        T::from_own_data(data).map_err(|data| Error::NotOfType { value: data.to_string(), expected: T::TYPE })
+    }
+
+    /// Has `call` call a function of the program with arguments, which are pinned meanwhile.
+    fn call_with<T>(
+        &mut self,
+        function: &impl Callable,
+        arguments: impl IntoIterator<Item = Data>,
+        call: impl FnOnce(&mut Vm, Value, &[Value]) -> Result<T, CallError>,
+    ) -> Result<T, Error> {
+        let callee = match function.name() {
+            Some(name) => self.machine.callee_named(name).ok_or(Error::NoMemory("the name of a function"))?,
+            None => {
+                let callee = function.callee(&self.machine.inbox());
+                self.machine.callee(&callee).ok_or_else(|| Error::NotOfType {
+                    value: "a function of another engine".into(),
+                    expected: "FUNCTION",
+                })?
+            }
+        };
+        // The list is kept for the next call.
+        let mut values = std::mem::take(&mut self.arguments);
+        self.machine.pin(callee);
+        let result = self.import_all(arguments, &mut values).and_then(|()| {
+            let result = call(&mut self.machine, callee, &values);
+            result.map_err(|error| self.error(error))
+        });
+        values.drain(..).for_each(|value| self.machine.unpin(value));
+        self.machine.unpin(callee);
+        self.arguments = values;
+        result
+    }
+
+    /// Adds arguments as values of the program, pinned, to a list.
+    fn import_all(
+        &mut self,
+        arguments: impl IntoIterator<Item = Data>,
+        values: &mut Vec<Value>,
+    ) -> Result<(), Error> {
+        for argument in arguments {
+            let atom = argument.as_atom().and_then(|atom| self.machine.import_atom(atom).ok());
+            // A collection may be needed, also for a float.
+            let import = || self.machine.import_or_collect(&argument.to_datum(USER_PACKAGE));
+            let value = atom.or_else(import).ok_or(Error::NoMemory("the arguments of a call"))?;
             self.machine.pin(value);
             values.push(value);
         }
-        let result = self.machine.call(values[0], &values[1..], self.ticks);
-        values.into_iter().for_each(|value| self.machine.unpin(value));
-        let value = self.first_value(result)?;
-        let value = Data::whole(&self.machine.export(value)?)?;
-        T::from_data(&value).ok_or_else(|| Error::NotOfType { value: value.to_string(), expected: T::TYPE })
+        Ok(())
     }
 }
 

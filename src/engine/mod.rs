@@ -46,8 +46,8 @@ pub use call::{Call, Failure};
 pub use esl_vm::observe::{Observer, Seen};
 pub use esl_vm::task::TaskNumber;
 pub use executor::{Executor, HostFuture};
-pub use function::{Callable, Function};
-pub use handle::{Handle, Reply, TaskHandle};
+pub use function::{BegunCall, Callable, Function};
+pub use handle::{Handle, InputHandle, Reply, TaskHandle};
 pub use looping::{Ending, Poll, Running};
 pub use operation::Operation;
 pub use patch::{ProgramDefinition, ProgramDefinitionKind};
@@ -70,6 +70,8 @@ pub use watch::{FactWatch, WatchedFact};
 pub struct Engine {
     machine: Vm,
     ticks: u64,
+    /// Room for the arguments of a call; empty between two calls.
+    arguments: Vec<Value>,
     /// Runs the futures of operations.
     executor: Executor,
     /// Number of names of watches over facts.
@@ -95,6 +97,7 @@ impl Engine {
         Ok(Engine {
             machine,
             ticks: u64::MAX,
+            arguments: Vec::new(),
             executor: executor::thread(),
             watches: 0,
             left_watches: LeftWatches::default(),
@@ -330,6 +333,12 @@ impl Engine {
             return Error::DoesNotCompile(diagnostics);
         }
         error
+    }
+
+    /// Writes what the program has printed and is still in a buffer. All calls that run the program do so at
+    /// their end, except [`Engine::begin_call`].
+    pub fn flush(&mut self) {
+        self.machine.flush();
     }
 
     /// Returns a handle, through which other threads reach the run.

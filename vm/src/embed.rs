@@ -31,6 +31,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
 
+pub use crate::datum::Atom;
 pub use crate::datum::DatumError as ExportError;
 pub use esl_host::{DataFunction, HostFunction, HostRow, Need};
 
@@ -224,6 +225,23 @@ impl Vm {
         let (datum, work) = datum::export(&self.heap, &self.names, value, describe)?;
         self.exchange.charge(work);
         Ok(datum)
+    }
+
+    /// Returns the atom that a value is, if it is one: [`Vm::export`] of the others.
+    pub fn export_atom(&mut self, value: Value) -> Option<Atom> {
+        let atom = datum::atom_of(&self.heap, value)?;
+        self.exchange.charge(datum::WORK_OF_ATOM);
+        Some(atom)
+    }
+
+    /// Returns an atom as a value.
+    ///
+    /// # Errors
+    /// [`Exit::Collect`] without room.
+    pub fn import_atom(&mut self, atom: Atom) -> Result<Value, Exit> {
+        let value = datum::value_of_atom(&mut self.heap, atom)?;
+        self.exchange.charge(datum::WORK_OF_ATOM);
+        Ok(value)
     }
 
     /// Returns data as a value.

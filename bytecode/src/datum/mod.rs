@@ -18,6 +18,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use num_bigint::BigInt;
 
+use crate::integer::Integer;
 use crate::packed::PackedVector;
 use crate::properties::{PropertyList, PropertyValue};
 use crate::span::Span;
@@ -37,7 +38,7 @@ pub enum DatumKind {
     /// A symbol other than `NIL`.
     Symbol(Symbol),
     /// An integer of any size.
-    Integer(BigInt),
+    Integer(Integer),
     /// A ratio in lowest terms with a denominator above 1.
     Ratio(BigInt, BigInt),
     /// A double float.
@@ -213,7 +214,7 @@ impl Datum {
     }
 
     /// Returns an integer.
-    pub fn integer(value: impl Into<BigInt>, span: Span) -> Datum {
+    pub fn integer(value: impl Into<Integer>, span: Span) -> Datum {
         Datum::new(DatumKind::Integer(value.into()), span)
     }
 

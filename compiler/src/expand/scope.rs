@@ -10,7 +10,7 @@
 
 use std::sync::Arc;
 
-use esl_bytecode::BigInt;
+use esl_bytecode::Integer;
 use esl_bytecode::compile::{Arity, Environment};
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
 use esl_bytecode::locals::{LocalMeaning, Locals};
@@ -55,7 +55,7 @@ pub(super) enum Tag {
     /// A symbol, `NIL` included.
     Symbol(Symbol),
     /// An integer.
-    Integer(BigInt),
+    Integer(Integer),
 }
 
 impl Tag {

@@ -4,10 +4,10 @@
 //! numbers and characters become one entry; entries refer to earlier entries only. Data of any depth are
 //! converted without native recursion.
 
-use esl_bytecode::BigInt;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::module::{Constant, FunctionNumber, PoolIdx};
 use esl_bytecode::symbol::Symbol;
+use esl_bytecode::{BigInt, Integer};
 use rustc_hash::FxHashMap;
 
 /// Identity of a constant: for literals with an identity their node, otherwise their value.
@@ -16,7 +16,7 @@ enum LiteralKey {
     Nil,
     True,
     Symbol(Symbol),
-    Integer(BigInt),
+    Integer(Integer),
     Ratio(BigInt, BigInt),
     /// The bits of the float, so that the zeros differ.
     Float(u64),
@@ -53,8 +53,8 @@ impl Pool {
     }
 
     /// Returns the entry for an integer.
-    pub(crate) fn integer(&mut self, value: &BigInt) -> PoolIdx {
-        self.enter(LiteralKey::Integer(value.clone()), Constant::Integer(value.clone()))
+    pub(crate) fn integer(&mut self, value: &Integer) -> PoolIdx {
+        self.enter(LiteralKey::Integer(value.clone()), Constant::Integer(value.to_big()))
     }
 
     /// Returns the entry for a function of the module.
@@ -115,7 +115,7 @@ impl Pool {
             DatumKind::Symbol(symbol) if symbol.is_cl("NIL") => Constant::Nil,
             DatumKind::Symbol(symbol) if symbol.is_cl("T") => Constant::True,
             DatumKind::Symbol(symbol) => Constant::Symbol(symbol.clone()),
-            DatumKind::Integer(value) => Constant::Integer(value.clone()),
+            DatumKind::Integer(value) => Constant::Integer(value.to_big()),
             DatumKind::Ratio(numerator, denominator) => {
                 Constant::Ratio(numerator.clone(), denominator.clone())
             }

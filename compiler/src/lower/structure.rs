@@ -1,6 +1,6 @@
 //! Slots of structures and tests for their classes.
 
-use esl_bytecode::BigInt;
+use esl_bytecode::Integer;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
@@ -55,7 +55,7 @@ impl FunctionBuilder<'_, '_> {
     fn distant_slot(&mut self, builtin: Builtin, class: &Symbol, slot: u16, forms: &[NodeId], dest: Dest) {
         let window = self.registers.top();
         self.registers.take(2);
-        for entry in [self.module.pool.symbol(class), self.module.pool.integer(&BigInt::from(slot))] {
+        for entry in [self.module.pool.symbol(class), self.module.pool.integer(&Integer::from(slot))] {
             let constant = ConstIdx(self.constant_index(entry));
             let register = self.registers.take(1);
             self.emit(Instr::LoadConst { dst: register.into(), constant });

@@ -213,7 +213,7 @@ impl<'a> DatumBuilder<'a> {
     fn number(&mut self, number: Result<NumberToken, NumberError>, start: u32, end: u32) -> Datum {
         let span = self.span(start, end);
         match number {
-            Ok(NumberToken::Integer(value)) => Datum::new(DatumKind::Integer(value), span),
+            Ok(NumberToken::Integer(value)) => Datum::integer(value, span),
             Ok(NumberToken::Ratio(numerator, denominator)) => {
                 Datum::new(DatumKind::Ratio(numerator, denominator), span)
             }

@@ -126,7 +126,7 @@ const WRITE: &str = "%WRITE-OPERATOR";
 fn told(outboxes: &Outboxes, arguments: &[Datum]) -> Option<(Outbox, WireForm)> {
     let [number, said] = arguments else { return None };
     let DatumKind::Integer(number) = number.kind() else { return None };
-    let outbox = outboxes.of(u64::try_from(number.clone()).ok()?)?;
+    let outbox = outboxes.of(u64::try_from(number).ok()?)?;
     let form = match said.kind() {
         DatumKind::String(text) => written(text),
         _ => datum::form_of(said),

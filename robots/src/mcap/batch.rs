@@ -40,7 +40,7 @@ pub(super) fn times(seconds: &Datum) -> Result<Vec<u64>, HostFailure> {
 fn of_datum(seconds: &Datum) -> Result<u64, HostFailure> {
     match seconds.kind() {
         DatumKind::Float(float) => of_float(*float),
-        DatumKind::Integer(whole) => in_range(&(whole * SECOND), seconds),
+        DatumKind::Integer(whole) => in_range(&(whole.to_big() * SECOND), seconds),
         DatumKind::Ratio(over, under) => in_range(&rounded(&(over * SECOND), under), seconds),
         _ => Err(HostFailure::of_type(seconds, "REAL")),
     }
@@ -124,7 +124,8 @@ mod tests {
         assert_eq!(time(DatumKind::Ratio(1.into(), 2_000_000_000.into())), Ok(0));
         assert_eq!(time(DatumKind::Ratio(3.into(), 2_000_000_000.into())), Ok(2));
         assert!(
-            time(DatumKind::Integer(BigInt::from(1) << 80)).is_err_and(|text| text.contains("MCAP-ERROR"))
+            time(DatumKind::Integer(BigInt::from(1_u128 << 80).into()))
+                .is_err_and(|text| text.contains("MCAP-ERROR"))
         );
         assert!(time(DatumKind::String("1".into())).is_err_and(|text| text.contains("TYPE-ERROR")));
     }

@@ -326,7 +326,7 @@ fn time_of(seconds: &Datum) -> Option<Option<Datum>> {
             BigInt::from(whole.to_i64().unwrap_or(i64::MAX)) * BILLION
                 + BigInt::from(rest.to_i64().unwrap_or(0))
         }
-        DatumKind::Integer(value) => value * BILLION,
+        DatumKind::Integer(value) => value.to_big() * BILLION,
         DatumKind::Ratio(numerator, denominator) => {
             num_integer::Integer::div_floor(&(numerator * BILLION), denominator)
         }

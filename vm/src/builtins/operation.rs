@@ -13,17 +13,21 @@ use crate::vm::Vm;
 use crate::wait::handle;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
+use smallvec::SmallVec;
 
 use super::expect::exactly;
+
+/// Arguments of a call of the host, of which most calls have few.
+pub(super) type HostArguments = SmallVec<[Datum; 6]>;
 
 /// Returns a function of the host, if there is one, and its arguments, from a symbol and a list.
 ///
 /// # Errors
 /// A failure if an argument is not data, or if the program does not have a right that the function needs.
-pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(Option<GivenIndex>, Vec<Datum>), Exit> {
+pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(Option<GivenIndex>, HostArguments), Exit> {
     let (name, arguments) = (call[0], call[1]);
     let function = function_named(vm, name);
-    let mut data = Vec::new();
+    let mut data = HostArguments::new();
     let mut rest = arguments;
     while let Some(pair) = vm.heap.as_cons(rest) {
         match datum::export(&vm.heap, &vm.names, pair.car, describe) {

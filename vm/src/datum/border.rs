@@ -7,10 +7,58 @@ use super::walk::plain_kind;
 use super::{DatumError, Unit, packed};
 use crate::heap::{AllocError, Heap};
 use crate::names::Names;
+use crate::names::load::{character, integer_value};
 use crate::value::Value;
 
 /// Bytes of a text that are moved in the time of one unit of work.
 const BYTES_TOGETHER: usize = 4;
+
+/// A value that crosses the border without memory of its own, as most arguments and results of calls do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Atom {
+    /// `NIL`.
+    Nil,
+    /// `T`.
+    True,
+    /// An integer of 64 bits.
+    Integer(i64),
+    /// A double float.
+    Float(f64),
+    /// A character.
+    Character(char),
+}
+
+/// Work of moving an atom.
+pub(crate) const WORK_OF_ATOM: usize = 1;
+
+/// Returns the atom that a value is, if it is one.
+pub(crate) fn atom_of(heap: &Heap, value: Value) -> Option<Atom> {
+    if let Some(integer) = value.as_fixnum() {
+        return Some(Atom::Integer(integer));
+    }
+    match value {
+        Value::NIL => Some(Atom::Nil),
+        Value::T => Some(Atom::True),
+        _ => match heap.as_double(value) {
+            Some(float) => Some(Atom::Float(float)),
+            None => value.as_character().and_then(char::from_u32).map(Atom::Character),
+        },
+    }
+}
+
+/// Returns the value that an atom is.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn value_of_atom(heap: &mut Heap, atom: Atom) -> Result<Value, AllocError> {
+    match atom {
+        Atom::Nil => Ok(Value::NIL),
+        Atom::True => Ok(Value::T),
+        Atom::Integer(integer) => integer_value(heap, &integer.into()),
+        Atom::Float(float) => heap.float(float),
+        Atom::Character(c) => Ok(character(c)),
+    }
+}
 
 /// Returns a value as data, and the work that it took. An object that no data stands for is described.
 ///
@@ -22,6 +70,10 @@ pub(crate) fn export(
     value: Value,
     describe: fn(&Heap, Value) -> String,
 ) -> Result<(Datum, usize), DatumError> {
+    // Most values are integers, which nothing below has to be asked about.
+    if let Some(integer) = value.as_fixnum() {
+        return Ok((Datum::integer(integer, Span::default()), WORK_OF_ATOM));
+    }
     // An atom shares nothing with other parts, so it needs neither walk nor memory.
     let plain = || Some(Datum::new(plain_kind(heap, value)?, Span::default()));
     if let Some(datum) = names.opaque_of(heap, value).cloned().or_else(plain) {
@@ -59,6 +111,15 @@ pub(crate) fn import(
     names: &mut Names,
     datum: &Datum,
 ) -> Result<(Value, usize), AllocError> {
+    let atom = match datum.kind() {
+        DatumKind::Nil => Some(Atom::Nil),
+        DatumKind::Integer(integer) => integer.as_small().map(Atom::Integer),
+        DatumKind::Float(float) => Some(Atom::Float(*float)),
+        _ => None,
+    };
+    if let Some(atom) = atom {
+        return Ok((value_of_atom(heap, atom)?, WORK_OF_ATOM));
+    }
     let mut unit = Unit::of_host();
     let value = unit.border_value(heap, names, datum)?;
     let work = if datum.is_compound() { unit.take_work() as usize } else { work_of(datum) };

@@ -30,12 +30,13 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Home, Symbol, symbol_of_setf_cell};
 
 use crate::heap::{AllocError, Heap};
-use crate::names::load::{SharedObjects, array, character, integer, ratio};
+use crate::names::load::{SharedObjects, array, character, integer_value, ratio};
 use crate::names::{GivenMap, GivenSet, Names, RootMap};
 use crate::value::Value;
 
+pub use border::Atom;
 use border::work_of;
-pub(crate) use border::{export, import, import_all};
+pub(crate) use border::{WORK_OF_ATOM, atom_of, export, import, import_all, value_of_atom};
 use environment::Environments;
 use parts::{are_parts, datum_with};
 pub(crate) use walk::DatumWalk;
@@ -314,7 +315,7 @@ impl Unit {
     ) -> Result<Value, AllocError> {
         Ok(match datum.kind() {
             DatumKind::Symbol(symbol) => self.symbol_object(heap, names, symbol)?,
-            DatumKind::Integer(value) => integer(heap, value)?,
+            DatumKind::Integer(value) => integer_value(heap, value)?,
             DatumKind::Ratio(numerator, denominator) => ratio(heap, numerator, denominator)?,
             DatumKind::Float(value) => heap.float(*value)?,
             DatumKind::Character(c) => character(*c),

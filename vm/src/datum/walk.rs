@@ -296,7 +296,8 @@ pub(super) fn plain_kind(heap: &Heap, object: Value) -> Option<DatumKind> {
         return Some(DatumKind::Integer(n));
     }
     if let Some((numerator, denominator)) = heap.ratio(object) {
-        return Some(DatumKind::Ratio(integer_of(heap, numerator)?, integer_of(heap, denominator)?));
+        let part = |value| Some(integer_of(heap, value)?.to_big());
+        return Some(DatumKind::Ratio(part(numerator)?, part(denominator)?));
     }
     if let Some(x) = heap.as_double(object) {
         return Some(DatumKind::Float(x));

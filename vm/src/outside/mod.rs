@@ -4,13 +4,13 @@
 mod under_way;
 
 use std::collections::BTreeMap;
-use std::hash::{BuildHasherDefault, DefaultHasher};
 
 use esl_bytecode::datum::Datum;
 use esl_heap::state::{StateSink, Stated};
 use esl_host::machine::{Asked, Canceller, Console};
 use esl_host::{CallEffect, Host, HostCall, HostFailure, HostFunction, HostOperation, Inbox, Need, Output};
 use indexmap::IndexMap;
+use rustc_hash::FxBuildHasher;
 
 use crate::task::TaskNumber;
 use crate::value::Value;
@@ -72,7 +72,7 @@ pub(crate) struct Outside {
     /// The standard streams, buffered.
     pub(crate) console: Console,
     /// The embedder's functions, by name, in the order in which they were given.
-    pub(crate) functions: IndexMap<String, Given, BuildHasherDefault<DefaultHasher>>,
+    pub(crate) functions: IndexMap<String, Given, FxBuildHasher>,
     /// Number of calls of these.
     pub(crate) calls: u64,
     /// Answers of these, while there is no room for them in the heap.

@@ -3,13 +3,14 @@
 use std::fmt;
 
 use esl_bytecode::datum::Datum;
-use esl_host::FailureFrame;
+use esl_host::{Answer, FailureFrame, Incoming, Pending};
 
-use super::RunOutcome;
 use super::ending::end_task;
+use super::question::begins_no_call;
+use super::{RunOutcome, run_tasks};
 use crate::observe::Seen;
 use crate::report;
-use crate::task::{Task, TaskEnd, TaskId, TaskResult};
+use crate::task::{Task, TaskEnd, TaskId, TaskResult, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -89,6 +90,21 @@ impl Vm {
         self.call_or_condition(function, arguments, ticks).map_err(|(error, _)| error)
     }
 
+    /// As [`Vm::call`]; returns the first value, or `NIL` if there is none.
+    ///
+    /// # Errors
+    /// [`CallError`].
+    pub fn call_for_value(
+        &mut self,
+        function: Value,
+        arguments: &[Value],
+        ticks: u64,
+    ) -> Result<Value, CallError> {
+        let id = self.spawn(function, arguments).map_err(|_| CallError::NoMemory)?;
+        let first = |values: &[Value]| values.first().copied().unwrap_or(Value::NIL);
+        self.run_call(id, ticks, first).map_err(|(error, _)| error)
+    }
+
     /// As [`Vm::call`], whatever is left of the run's budget.
     ///
     /// # Errors
@@ -113,7 +129,44 @@ impl Vm {
         ticks: u64,
     ) -> Result<Vec<Value>, (CallError, Value)> {
         let id = self.spawn(function, arguments).map_err(|_| (CallError::NoMemory, Value::NIL))?;
-        self.run_call(id, ticks)
+        self.run_call(id, ticks, <[Value]>::to_vec)
+    }
+
+    /// Begins a call of a function in a task of its own, and runs tasks for a portion of ticks, until the
+    /// task has ended or all of them wait. Returns the first value, or `NIL` if there is none; or the answer
+    /// to come, if the task goes on in the runs to come.
+    ///
+    /// # Errors
+    /// [`CallError`].
+    pub fn begin_call_for_value(
+        &mut self,
+        function: Value,
+        arguments: &[Value],
+        ticks: u64,
+    ) -> Result<Result<Value, Pending>, CallError> {
+        if begins_no_call(self) {
+            let pending = self.outside.inbox.expect_answer();
+            self.outside.inbox.answer(pending.number(), Answer::Ended);
+            return Ok(Err(pending));
+        }
+        let id = self.spawn(function, arguments).map_err(|_| CallError::NoMemory)?;
+        let outcome = run_tasks(self, Some(id), ticks, false);
+        let task = self.scheduler.tasks.get(id);
+        if let Some(values) = task.and_then(Task::values) {
+            let value = values.first().copied().unwrap_or(Value::NIL);
+            self.forget(id);
+            return Ok(Ok(value));
+        }
+        if task.is_none_or(|task| task.state == TaskState::Ended) {
+            return Err(self.error_of_call(id, ticks, outcome).0);
+        }
+        if outcome == RunOutcome::Stopped {
+            // It was for the run of which this is a portion.
+            self.outside.inbox.put(Incoming::Stop);
+        }
+        let pending = self.outside.inbox.expect_answer();
+        self.embedder.calls.insert(id.index, pending.number());
+        Ok(Err(pending))
     }
 
     /// As [`Vm::call_or_condition`]; a signal of the process aborts the call.
@@ -125,38 +178,53 @@ impl Vm {
     ) -> Result<Vec<Value>, (CallError, Value)> {
         let id = self.spawn(function, arguments).map_err(|_| (CallError::NoMemory, Value::NIL))?;
         self.embedder.interruptible = Some(id);
-        let result = self.run_call(id, ticks);
+        let result = self.run_call(id, ticks, <[Value]>::to_vec);
         self.embedder.interruptible = None;
         result
     }
 
-    /// Runs tasks until the one of a call has ended, and returns what it gives.
-    fn run_call(&mut self, id: TaskId, ticks: u64) -> Result<Vec<Value>, (CallError, Value)> {
+    /// Runs tasks until the one of a call has ended, and returns its values as `read` reads them.
+    fn run_call<T>(
+        &mut self,
+        id: TaskId,
+        ticks: u64,
+        read: impl FnOnce(&[Value]) -> T,
+    ) -> Result<T, (CallError, Value)> {
         let outcome = self.run_until(Some(id), ticks);
+        if let Some(values) = self.scheduler.tasks.get(id).and_then(Task::values) {
+            let read = read(values);
+            self.forget(id);
+            return Ok(read);
+        }
+        Err(self.error_of_call(id, ticks, outcome))
+    }
+
+    /// Ends the task of a call that has not succeeded. Returns the reason, and the condition of a failure.
+    #[cold]
+    fn error_of_call(&mut self, id: TaskId, ticks: u64, outcome: RunOutcome) -> (CallError, Value) {
         let result = self.result(id);
         end_task(self, id);
         let report = self.report(id);
         let frames = self.failure_frames(id).into();
         self.forget(id);
         let error = match (result, outcome) {
-            (TaskResult::Succeeded(values), _) => return Ok(values),
             (TaskResult::Failed(condition), _) => {
                 let cause = report::cause_label(&self.heap, condition);
                 let message = self.embedder.last_words.take().unwrap_or_else(|| self.describe(condition));
                 let arguments = FailureArguments(report::failure_arguments(self, condition));
                 let report = report.unwrap_or_default();
                 let failed = CallError::Failed { cause, message, report, arguments, frames };
-                return Err((failed, condition));
+                return (failed, condition);
             }
             (TaskResult::Aborted, _) => {
                 self.outside.exit_status.map_or(CallError::Aborted, CallError::Exited)
             }
-            (TaskResult::Running, RunOutcome::Waiting) => CallError::Deadlocked,
-            (TaskResult::Running, RunOutcome::BudgetSpent) => CallError::BudgetSpent,
-            (TaskResult::Running, RunOutcome::Stopped) => CallError::Stopped,
-            (TaskResult::Running, RunOutcome::Done | RunOutcome::TicksUsed) => CallError::TicksUsed(ticks),
+            (_, RunOutcome::Waiting) => CallError::Deadlocked,
+            (_, RunOutcome::BudgetSpent) => CallError::BudgetSpent,
+            (_, RunOutcome::Stopped) => CallError::Stopped,
+            (_, RunOutcome::Done | RunOutcome::TicksUsed) => CallError::TicksUsed(ticks),
         };
-        Err((error, Value::NIL))
+        (error, Value::NIL)
     }
 
     /// Makes a program's main task the one with whose failure the run ends.

@@ -59,7 +59,11 @@ pub(super) fn finish_task(vm: &mut Vm) {
     let task = vm.scheduler.task_mut();
     task.state = TaskState::Ended;
     if task.flags.kept() {
-        let extra = task.extra_mut();
+        if task.extra.is_none() {
+            let extra = vm.scheduler.tasks.make_extra();
+            vm.scheduler.task_mut().extra = Some(extra);
+        }
+        let extra = vm.scheduler.task_mut().extra_mut();
         extra.end = Some(end);
         extra.values.clone_from(&values);
         if answer_call(vm, end, &values) {

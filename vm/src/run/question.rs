@@ -26,7 +26,7 @@ pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
             vm.outside.inbox.answer(number, Answer::Tasks(tasks));
         }
         // A run that is ending begins no call.
-        Question::Call { .. } if vm.embedder.is_ending || all_are_to_end(vm) => {
+        Question::Call { .. } if begins_no_call(vm) => {
             vm.outside.inbox.answer(number, Answer::Ended);
         }
         Question::Call { function, arguments, goes_first } => {
@@ -40,6 +40,11 @@ pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
             }
         }
     }
+}
+
+/// Returns whether the run is ending, and begins no call any more.
+pub(super) fn begins_no_call(vm: &Vm) -> bool {
+    vm.embedder.is_ending || all_are_to_end(vm)
 }
 
 /// Returns whether all tasks of a program have been asked to end. Each task that ends passes the request to
@@ -77,9 +82,29 @@ impl Vm {
             FunctionRef::Named(name) => name,
             FunctionRef::Kept(number) => return self.embedder.kept.get(number).copied(),
         };
+        self.symbol_named(name)
+    }
+
+    /// Returns the function that the outside calls by this name, in any case. `None` if there is no room for
+    /// the symbol.
+    pub fn callee_named(&mut self, name: &str) -> Option<Value> {
+        // Almost all names are short and ASCII, and need no memory of their own.
+        let mut bytes = [0_u8; 64];
+        if let Some(bytes) = bytes.get_mut(..name.len())
+            && name.is_ascii()
+        {
+            bytes.copy_from_slice(name.as_bytes());
+            bytes.make_ascii_uppercase();
+            return self.symbol_named(std::str::from_utf8(bytes).ok()?);
+        }
+        self.symbol_named(&name.to_uppercase())
+    }
+
+    /// Returns the symbol with this name, which may have a package before it; `None` if there is no room.
+    fn symbol_named(&mut self, name: &str) -> Option<Value> {
         let (package, name) = match name.rsplit_once(':') {
             Some((package, name)) => (package.trim_end_matches(':'), name),
-            None => (USER_PACKAGE, &**name),
+            None => (USER_PACKAGE, name),
         };
         let packages = self.names.packages();
         let found = packages.named(package).and_then(|package| packages.find(package, name));
@@ -90,6 +115,14 @@ impl Vm {
         }
         let symbol = Datum::symbol(symbol, Default::default());
         import_datum(self, &symbol)
+    }
+}
+
+impl Vm {
+    /// Returns data as a value, after a collection if need be; `None` if there is no room. Values that the
+    /// embedder holds meanwhile are pinned.
+    pub fn import_or_collect(&mut self, datum: &Datum) -> Option<Value> {
+        import_datum(self, datum)
     }
 }
 

@@ -61,7 +61,8 @@ impl Vm {
     pub fn forget(&mut self, id: TaskId) {
         let scheduler = &mut self.scheduler;
         let Some(task) = scheduler.tasks.get(id) else { return };
-        if task.state != TaskState::Ended {
+        let has_ended = task.state == TaskState::Ended;
+        if !has_ended {
             scheduler.counts.alive -= 1;
             scheduler.counts.foreground -= usize::from(!task.flags.daemon());
             let (object, wait, account) = (task.object, task.wait, task.account);
@@ -75,8 +76,10 @@ impl Vm {
             self.heap.slot_set(object, event::RESULT, Value::NIL);
             self.heap.slot_set(object, event::STATE, self.names.known.aborted);
         }
-        if let Some(mut task) = self.scheduler.tasks.remove(id) {
-            task.uncount(&mut self.heap);
+        match self.scheduler.tasks.remove(id) {
+            Some(task) if has_ended => self.scheduler.tasks.keep_spare(&mut self.heap, task),
+            Some(mut task) => task.uncount(&mut self.heap),
+            None => {}
         }
     }
 }

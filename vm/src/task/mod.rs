@@ -208,6 +208,15 @@ impl Extra {
         size_of::<Extra>() + self.limits.capacity() * 2 * size_of::<Limit>()
     }
 
+    /// Drops the contents, to be used again. Returns whether it is as good as new: room for limits counts as
+    /// memory of its task.
+    pub(super) fn clear(&mut self) -> bool {
+        (self.report, self.end, self.fund) = (None, None, None);
+        self.values.clear();
+        self.interrupts.clear();
+        self.limits.capacity() == 0
+    }
+
     /// Calls `visit` with every value that it holds.
     pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
         self.limits.iter().filter_map(|limit| limit.expired).for_each(&mut *visit);
@@ -376,6 +385,12 @@ impl Task {
         self.flags.set_abort_pending(false);
         self.flags.set_urgent(true);
         Unwinding { target: UnwindTarget::Root(end), values: Vec::new() }
+    }
+
+    /// Returns the values with which it has succeeded, if it has and they are kept for the embedder.
+    pub(crate) fn values(&self) -> Option<&[Value]> {
+        let extra = self.extra.as_ref()?;
+        matches!(extra.end, Some(TaskEnd::Succeeded)).then_some(&*extra.values)
     }
 
     /// Returns its result, as far as that is kept for the embedder.

@@ -2,7 +2,7 @@
 
 use esl_heap::list_state;
 
-use super::{Rest, Standstill, Task, TaskIndex};
+use super::{Extra, Rest, Standstill, Task, TaskIndex};
 use crate::heap::{Heap, Holder};
 use crate::stack::Stack;
 use crate::value::Value;
@@ -18,6 +18,8 @@ pub struct TaskId {
 
 /// Maximal number of records kept to be used again.
 const SPARE: usize = 64;
+/// Maximal number of rarely used parts kept to be used again: calls from outside come one after another.
+const SPARE_EXTRA: usize = 4;
 /// Maximal number of words of stack that a record is kept with.
 const SPARE_WORDS: usize = 64;
 /// Place of a task in the table.
@@ -43,6 +45,9 @@ pub(crate) struct Tasks {
     /// Records of tasks that have ended, to be used again.
     #[allow(clippy::vec_box, reason = "the boxes are kept, since they go into places as they are")]
     spare: Vec<Box<Task>>,
+    /// Rarely used parts of such records, to be used again.
+    #[allow(clippy::vec_box, reason = "the boxes are kept, since they go into records as they are")]
+    spare_extra: Vec<Box<Extra>>,
     /// Number of places, from the first on, that the collector has yet to look at.
     unmet: usize,
     /// Large stacks of tasks that have ended, to be freed.
@@ -56,6 +61,7 @@ list_state! { Tasks {
     standstills: Run,
     free: Run,
     spare: Derived,
+    spare_extra: Derived,
     unmet: Derived,
     discarded: Derived,
 } }
@@ -75,13 +81,29 @@ impl Tasks {
 
     /// Frees the place of a task that has ended, and keeps its record if few are kept. The heap goes on
     /// counting one that is kept.
-    pub(crate) fn retire(&mut self, heap: &mut Heap, id: TaskId, mut task: Box<Task>) {
+    pub(crate) fn retire(&mut self, heap: &mut Heap, id: TaskId, task: Box<Task>) {
         self.remove(id);
+        self.keep_spare(heap, task);
+    }
+
+    /// Keeps the record of a task that has ended, which has no place any more, if few are kept.
+    pub(crate) fn keep_spare(&mut self, heap: &mut Heap, mut task: Box<Task>) {
+        if let Some(mut extra) = task.extra.take()
+            && self.spare_extra.len() < SPARE_EXTRA
+            && extra.clear()
+        {
+            self.spare_extra.push(extra);
+        }
         if self.spare.len() < SPARE && task.stack.capacity() <= SPARE_WORDS {
             self.spare.push(task);
         } else {
             task.uncount(heap);
         }
+    }
+
+    /// Returns the rarely used parts for a record, without contents.
+    pub(crate) fn make_extra(&mut self) -> Box<Extra> {
+        self.spare_extra.pop().unwrap_or_default()
     }
 
     /// Takes the large stack of a task that has ended, to free it piece by piece.

@@ -35,7 +35,7 @@ pub(super) fn datum(image: &ModuleImage, packages: &[Arc<str>], index: PoolIdx) 
                         })
                     }
                     ConstantRecord::Fixnum(value) => DatumKind::Integer(value.into()),
-                    ConstantRecord::Integer(value) => DatumKind::Integer(value),
+                    ConstantRecord::Integer(value) => DatumKind::Integer(value.into()),
                     ConstantRecord::Ratio(numerator, denominator) => DatumKind::Ratio(numerator, denominator),
                     ConstantRecord::Float(value) => DatumKind::Float(value),
                     ConstantRecord::Character(value) => DatumKind::Character(value),

@@ -1,6 +1,6 @@
 //! Literal characters, numbers and arrays as values.
 
-use esl_bytecode::BigInt;
+use esl_bytecode::{BigInt, Integer};
 
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
@@ -21,15 +21,26 @@ pub(crate) fn integer(heap: &mut Heap, value: &BigInt) -> Result<Value, AllocErr
     heap.alloc_bignum(value.sign() == num_bigint::Sign::Minus, &limbs)
 }
 
+/// Returns the integer of a datum as a value.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn integer_value(heap: &mut Heap, value: &Integer) -> Result<Value, AllocError> {
+    match value.as_small().and_then(Value::fixnum) {
+        Some(fixnum) => Ok(fixnum),
+        None => integer(heap, &value.to_big()),
+    }
+}
+
 /// Returns the integer that a value is, of any size; `None` for any other value.
-pub(crate) fn integer_of(heap: &Heap, v: Value) -> Option<BigInt> {
+pub(crate) fn integer_of(heap: &Heap, v: Value) -> Option<Integer> {
     if let Some(n) = v.as_fixnum() {
         return Some(n.into());
     }
     let big = heap.bignum(v)?;
     let bytes: Vec<u8> = big.limbs.iter().flat_map(|limb| limb.to_le_bytes()).collect();
     let sign = if big.negative { num_bigint::Sign::Minus } else { num_bigint::Sign::Plus };
-    Some(BigInt::from_bytes_le(sign, &bytes))
+    Some(BigInt::from_bytes_le(sign, &bytes).into())
 }
 
 /// Returns a ratio in lowest terms as a value.

@@ -48,7 +48,7 @@ pub(crate) use image::{
     Images, constant as image_constant, function as image_function, open as open_image,
     origin as image_origin,
 };
-pub(crate) use literal::{array, character, integer, integer_of, ratio};
+pub(crate) use literal::{array, character, integer, integer_of, integer_value, ratio};
 pub(crate) use origin::is_of_library;
 use origin::is_of_module;
 pub use prepare::prepare;
