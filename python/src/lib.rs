@@ -13,6 +13,7 @@
 //! | `output` | the output of programs |
 //! | `wakeup` | waking the thread or the event loop that drives an engine |
 //! | `process` | copies of the process |
+//! | `command` | the commands `eslvm` and `eslc`, for the wheel |
 //!
 //! Guarantees: the interpreter's lock is released while a machine runs. Exceptions of a callback are failures
 //! of the call.
@@ -21,6 +22,8 @@
 #![deny(unsafe_code)]
 
 mod callback;
+#[cfg(feature = "commands")]
+pub mod command;
 mod engine;
 mod failure;
 mod handle;

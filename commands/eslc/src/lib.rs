@@ -13,7 +13,6 @@ mod warnings;
 use std::collections::HashSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::LazyLock;
 
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
@@ -241,8 +240,8 @@ const HABITS: command::Habits = &[
     ("repl", "eslvm repl"),
 ];
 
-/// Runs the command line of the process.
-pub fn main() -> ExitCode {
+/// Runs the command line of the process, and returns its exit status.
+pub fn main() -> u8 {
     command::add_modules();
     let status = match command::parse::<Eslc>("eslc check", HABITS).action {
         EslcAction::Compile { files, output: Some(output), compiling } => {
@@ -262,7 +261,7 @@ pub fn main() -> ExitCode {
         EslcAction::Man { folder } => Ok(command::write_man_pages(Eslc::command(), folder.as_deref())),
         EslcAction::Expand { file, compiling } => expand(&file, &compiling),
     };
-    ExitCode::from(status.unwrap_or_else(|status| status))
+    status.unwrap_or_else(|status| status)
 }
 
 /// Reads sources.

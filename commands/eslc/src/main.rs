@@ -4,5 +4,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    eslc::main()
+    ExitCode::from(eslc::main())
 }

@@ -1,10 +1,11 @@
 //! `eslvm`, the virtual machine of ESL as a command: what each subcommand does, and prints.
 //!
-//! The program itself, in `src/bin`, takes the arguments. Libraries hold the rest: the machine ([`esl`]),
+//! The module `command` takes the arguments. Libraries hold the rest: the machine ([`esl`]),
 //! tests and explorations ([`esl_testing`]), recordings ([`esl_replay`]), timelines ([`esl_timeline`]),
 //! servers of a run ([`esl_operate`]).
 #![forbid(unsafe_code)]
 
+mod command;
 pub mod explore;
 pub mod mcap;
 pub mod operate;
@@ -14,3 +15,5 @@ pub mod replay;
 pub mod rights;
 pub mod signal;
 pub mod testing;
+
+pub use command::main;

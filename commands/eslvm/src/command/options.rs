@@ -9,14 +9,14 @@ use esl::size::{parse_size, parse_stack};
 use esl_testing::inject::{InjectFormat, InjectSettings};
 use esl_vm::value::Value;
 use esl_vm::vm::Tier;
-use eslvm::mcap::{McapAction, RunFileOptions};
-use eslvm::operate::OperateOptions;
-use eslvm::profile::ProfileUnit;
-use eslvm::replay::ReplayOptions;
-use eslvm::rights::RightsOptions;
-use eslvm::testing::inject::InjectOptions;
 
-use crate::durable::{LookOptions, StateOptions};
+use super::durable::{LookOptions, StateOptions};
+use crate::mcap::{McapAction, RunFileOptions};
+use crate::operate::OperateOptions;
+use crate::profile::ProfileUnit;
+use crate::replay::ReplayOptions;
+use crate::rights::RightsOptions;
+use crate::testing::inject::InjectOptions;
 
 /// The answer to `--version`.
 static BUILD: LazyLock<String> = LazyLock::new(|| {

@@ -1,5 +1,4 @@
-//! `eslvm`: runs ESL programs, and the REPL.
-#![forbid(unsafe_code)]
+//! The command line of `eslvm`: its arguments, and what each subcommand does with them.
 
 mod durable;
 mod explore;
@@ -9,15 +8,15 @@ mod program;
 mod run;
 
 use std::path::Path;
-use std::process::ExitCode;
 
 use clap::CommandFactory;
 use esl::Config;
 use esl::host::RealHost;
 use esl::module_path::ModulePath;
 use esl_command as command;
-use eslvm::repl::AttachSecurity;
-use eslvm::{explore::read_schedule, replay, testing};
+
+use crate::repl::AttachSecurity;
+use crate::{explore::read_schedule, replay, testing};
 
 use durable::{run_durable, run_state};
 use explore::run_explore;
@@ -52,7 +51,8 @@ const HABITS: command::Habits = &[
     ("disasm", "eslc disasm"),
 ];
 
-fn main() -> ExitCode {
+/// Runs the command line of the process, and returns its exit status.
+pub fn main() -> u8 {
     #[cfg(unix)]
     raise_limit_of_descriptors();
     #[cfg(feature = "eslc")]
@@ -91,7 +91,7 @@ fn main() -> ExitCode {
             #[cfg(feature = "robots")]
             if speed != 1.0 && options.clock == ClockChoice::Ros {
                 command::complain("`--speed` has no effect on the clock of ROS: leave it out");
-                return ExitCode::from(command::USAGE);
+                return command::USAGE;
             }
             let path = ModulePath::new([file.as_path()], &modules.library);
             let rights = options.rights.rights();
@@ -172,15 +172,15 @@ fn main() -> ExitCode {
                 (false, None) => AttachSecurity::Plain,
                 (_, ca_file) => AttachSecurity::Tls(ca_file.as_deref()),
             };
-            let attach = |rights| eslvm::repl::attach(&address, security, secret_file.as_deref(), &rights);
+            let attach = |rights| crate::repl::attach(&address, security, secret_file.as_deref(), &rights);
             rights.rights().and_then(attach)
         }
-        EslvmAction::Mcap { action } => eslvm::mcap::run(&action),
+        EslvmAction::Mcap { action } => crate::mcap::run(&action),
         EslvmAction::Repl { options, modules } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &modules.library);
             match options.clock {
                 ClockChoice::Real | ClockChoice::Virtual => {
-                    eslvm::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
+                    crate::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
                 }
                 #[cfg(feature = "robots")]
                 ClockChoice::Ros => {
@@ -192,10 +192,10 @@ fn main() -> ExitCode {
             }
         }),
     };
-    ExitCode::from(status.unwrap_or_else(|status| status))
+    status.unwrap_or_else(|status| status)
 }
 
 /// Returns the number of processors.
-pub(crate) fn processors() -> usize {
+fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }

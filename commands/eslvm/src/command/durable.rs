@@ -18,13 +18,13 @@ use esl_durable::{
 };
 use esl_replay::RunSetup;
 use esl_vm::vm::Tier;
-use eslvm::operate::tell_manager;
-use eslvm::signal::{SignalTarget, end_on_signal_unless};
 
-use crate::figures::print_stats;
-use crate::options::{ClockChoice, LibraryOption, MachineOptions};
-use crate::program::{complain_of_signal, program_with_sources};
-use crate::run::RunReports;
+use super::figures::print_stats;
+use super::options::{ClockChoice, LibraryOption, MachineOptions};
+use super::program::{complain_of_signal, program_with_sources};
+use super::run::RunReports;
+use crate::operate::tell_manager;
+use crate::signal::{SignalTarget, end_on_signal_unless};
 
 /// Options of a durable run.
 #[derive(Args)]

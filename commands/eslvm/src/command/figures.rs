@@ -3,7 +3,8 @@
 use esl::program::Summary;
 use esl_command::say_error;
 use esl_vm::vm::{Tier, Vm};
-use eslvm::profile::{Profile, ProfiledFunction, UsedResources};
+
+use crate::profile::{Profile, ProfiledFunction, UsedResources};
 
 /// Functions whose figures are printed, at most.
 const SHOWN_FUNCTIONS: usize = 40;

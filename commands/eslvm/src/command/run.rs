@@ -10,14 +10,14 @@ use esl_command::{USAGE, complain, refuse_overwriting, say_error, say_error_part
 use esl_replay::{FileRecorder, RunSetup};
 use esl_timeline::Timeline;
 use esl_vm::vm::Tier;
-use eslvm::mcap::{McapRecording, RunFileOptions};
-use eslvm::operate::{OperateOptions, tell_manager};
-use eslvm::profile::{INTERVAL, Profile, ProfileUnit};
-use eslvm::signal::{SignalTarget, end_on_signal};
 
-use crate::figures::{print_functions, print_stats, print_tasks};
-use crate::options::{ClockChoice, MachineOptions, Stats, TierChoice};
-use crate::program::{complain_of_signal, program};
+use super::figures::{print_functions, print_stats, print_tasks};
+use super::options::{ClockChoice, MachineOptions, Stats, TierChoice};
+use super::program::{complain_of_signal, program};
+use crate::mcap::{McapRecording, RunFileOptions};
+use crate::operate::{OperateOptions, tell_manager};
+use crate::profile::{INTERVAL, Profile, ProfileUnit};
+use crate::signal::{SignalTarget, end_on_signal};
 
 /// The requested reports of a run.
 pub(crate) struct RunReports<'a> {

@@ -8,11 +8,11 @@ use esl_command as command;
 use esl_command::{NOT_COMPILED, ProgramFile};
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_testing::explore;
-use eslvm::explore::{ExplorationOptions, run};
 
-use crate::options::{ExploreArguments, GrainChoice, TimersChoice};
-use crate::processors;
-use crate::program::compiling;
+use super::options::{ExploreArguments, GrainChoice, TimersChoice};
+use super::processors;
+use super::program::compiling;
+use crate::explore::{ExplorationOptions, run};
 
 /// Explores the schedules of a program. Returns the exit status.
 ///

@@ -9,9 +9,9 @@ use esl_command as command;
 use esl_command::{NOT_COMPILED, ProgramFile, USAGE, complain};
 use esl_compiler::diagnostic::{Format, Renderer, Sources};
 use esl_testing::coverage::Coverage;
-use eslvm::signal::SignalTarget;
 
-use crate::options::MachineOptions;
+use super::options::MachineOptions;
+use crate::signal::SignalTarget;
 
 /// Reads the program in a file, and compiles it if it is a source, within the limits of its run. Returns
 /// its coverage too, if its passages are counted.
