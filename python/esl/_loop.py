@@ -6,10 +6,8 @@ import asyncio
 from typing import Any, Callable, Coroutine, Optional, Union
 
 from . import _esl
+from .engine import PORTION
 from .errors import Ended
-
-# Ticks after which a loop lets its other tasks run.
-PORTION = 100_000
 
 Awaited = Union[_esl.Reply, _esl.Task]
 # Returns the error to be raised for one that has come.

@@ -8,17 +8,22 @@ import os
 import time
 import weakref
 from contextlib import asynccontextmanager
-from typing import Any, AsyncIterator, Callable, Iterable, NamedTuple, Optional, TypeVar, Union
+from typing import TYPE_CHECKING, Any, AsyncIterator, Callable, Iterable, NamedTuple, Optional, TypeVar, Union
 
 from . import _esl
 from ._diagnosis import error_of, error_of_file
-from ._loop import PORTION, Awaited, Loop
 from ._progress import StatusLine
 from ._signature import Signature, arguments_of, program_name, signature_of
 from ._workers import run_in_thread
 from .display import Event, TaskInfo, Tasks, Timeline
 from .errors import CompileError, Ended, Failure
 from .facts import Facts, Inputs, Subscription
+
+if TYPE_CHECKING:
+    from ._loop import Awaited, Loop
+
+# Ticks after which signals of the process and other tasks of a loop have their turn.
+PORTION = 100_000
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -285,6 +290,9 @@ class Engine:
         """Runs the engine in the event loop while the body runs: evaluations and calls are awaitable meanwhile."""
         if self._running_loop():
             raise RuntimeError("the engine runs in an event loop already")
+        # Imported here: asyncio takes longer than all the rest of the package.
+        from ._loop import Loop
+
         loop = self._loop = Loop(self._machine)
         try:
             yield self

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import TYPE_CHECKING, Any, AsyncIterator, Callable, Iterator, NamedTuple
 
 from ._esl import Input
@@ -77,6 +76,9 @@ class Facts:
             async for change in engine.facts.changes("(at ?robot ?place)"):
                 print(change.bindings["place"], change.is_there)
         """
+        # Imported here: it takes longer than all the rest of the package.
+        import asyncio
+
         changes: asyncio.Queue[FactChange] = asyncio.Queue()
         # The engine runs on the thread of the loop.
         with self.watch(pattern, changes.put_nowait):
