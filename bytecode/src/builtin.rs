@@ -1623,8 +1623,9 @@ macro_rules! for_each_builtin {
             SignalEvent = event::signal, esl "SIGNAL-EVENT" ("event &rest arguments") shares points;
             /// How often an event was signalled.
             EventCount = event::event_count, esl "EVENT-COUNT" ("event") shares points;
-            /// The sum of the counts of an event, or of a list of events.
-            CountEvents = event::count_events, internal "%COUNT-EVENTS" ("events") shares points;
+            /// The mark of an event, which its next signal takes away, or the list of those of a list of
+            /// events. A wait that is given it does not begin if there was a signal since.
+            MarkEvents = event::mark_events, internal "%MARK-EVENTS" ("events") shares points;
             /// The name of an event or task, or `NIL`.
             EventName = event::event_name, internal "%EVENT-NAME" ("event") shares nothing;
             /// Whether `object` is an event; tasks are.
@@ -1686,8 +1687,10 @@ macro_rules! for_each_builtin {
                 slowly "%SLOW-SET-FLUENT";
             /// A new record of the sources that this task reads, for a watch if one is given.
             NewReads = coordination::new_reads, internal "%NEW-READS" ("&optional watch") shares points;
-            /// Notes that a source is read, with the count of its event; whether it was not noted yet.
+            /// Notes that a source is read, with the mark of its event; whether it was not noted yet.
             NoteSource = coordination::note_read, internal "%NOTE-SOURCE" ("source reads") shares points;
+            /// Whether a source is noted as read.
+            NotedP = coordination::noted_p, internal "%NOTED-P" ("source reads") shares nothing;
             /// The value of a fluent; it is noted as read if the reads are those of this task.
             NotedValue = coordination::noted_value, internal "%NOTED-VALUE" ("fluent reads") shares points
                 slowly "%SLOW-NOTED-VALUE";

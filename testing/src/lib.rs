@@ -39,7 +39,7 @@ use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
 
 use crate::coverage::Coverage;
-use crate::explore::{ExplorationScope, grains, reads_clock};
+use crate::explore::{ExplorationScope, grains, states_of};
 
 /// Statuses with which the library's `%run-test` ends a run.
 const ALL_HELD: u8 = 100;
@@ -400,7 +400,7 @@ fn explore_at(
         setup.note_passages(machine);
         verdict(ended, || captured.output() + &captured.error())
     };
-    let settings = &Settings { clock: settings.clock || reads_clock(program), ..*settings };
+    let settings = &states_of(program, settings);
     esl_vm::explore::explore_while(settings, begin, judge, |_| goes_on())
 }
 

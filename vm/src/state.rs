@@ -92,10 +92,10 @@ state! {
 state! {
     /// Visits the content of a scheduler.
     Scheduler by VisitScheduler :: scheduler_content {
-        content { tasks, timers }
+        content { tasks, timers, any_event }
         course {
             choices, readers, writers, end_of_all, main, main_number, serial, spent, rounds, is_paused, canary,
-            open_turn, any_event, starter,
+            open_turn, starter,
         }
         parts { queues, accounts, deliveries, counts, clock, points, turn }
         transient { running }
@@ -225,8 +225,14 @@ list_state! { Clock { is_virtual: Process, now: Run, looked_at: Run, moved_at: R
 list_state! { Points {
     grain: Process,
     has_clock: Process,
+    has_counts: Process,
     is_open: Run,
     has_shown: Run,
+    is_seen: Process,
+    is_sudden: Process,
+    raced: Process,
+    found_raced: Process,
+    is_timed: Process,
     was_hit: Process,
     has_guards: Process,
     asked: Run,

@@ -37,7 +37,7 @@ use esl_vm::vm::{Config, Vm};
 pub use forms::SourceForms;
 pub use library::function_symbol;
 pub use random::{RandomFound, RandomSettings, explore_randomly};
-pub use unseen::{UnseenChange, UnseenKind, reads_clock, unseen_changes};
+pub use unseen::{UnseenChange, UnseenKind, counts_signals, reads_clock, unseen_changes};
 pub use verdict::{ExplorationScope, grains};
 
 /// A run as it is seen from outside.
@@ -84,6 +84,15 @@ pub fn explore_with(
     explore_together(program, settings, 1, prepare, |_| true)
 }
 
+/// Returns the settings with which the states of a program differ by all that it may know.
+pub(crate) fn states_of(program: &Program, settings: &Settings) -> Settings {
+    Settings {
+        clock: settings.clock || reads_clock(program),
+        counts: settings.counts || counts_signals(program),
+        ..*settings
+    }
+}
+
 /// As [`explore_with`], in so many threads, which find the same as one, and for as long as `goes_on`, which
 /// is asked now and then.
 ///
@@ -96,7 +105,7 @@ pub fn explore_together(
     prepare: Prepare<'_>,
     goes_on: impl FnMut(&SearchProgress) -> bool,
 ) -> Result<Exploration<Behaviour>, Error> {
-    let settings = &Settings { clock: settings.clock || reads_clock(program), ..*settings };
+    let settings = &states_of(program, settings);
     let begin = || {
         let (machine, main, captured) = begin(program, prepare, settings.snapshots)?;
         Ok((machine, (main, captured)))

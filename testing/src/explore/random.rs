@@ -7,7 +7,7 @@ use esl::Error;
 use esl::program::{self, Program};
 use esl_vm::explore::{ExploredEnding, RandomSchedule, Settings};
 
-use super::{Behaviour, Prepare, begin, reads_clock};
+use super::{Behaviour, Prepare, begin, states_of};
 
 /// The random schedules to try.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +69,7 @@ pub fn explore_randomly(
     prepare: Prepare<'_>,
     goes_on: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<RandomFound, Error> {
-    let settings = &Settings { clock: settings.clock || reads_clock(program), ..*settings };
+    let settings = &states_of(program, settings);
     let run = |seed: u64, steps: u64| -> Result<SeededRun, Error> {
         let (mut machine, main, captured) = begin(program, prepare, false)?;
         let schedule = RandomSchedule { seed, depth: random.depth.max(1), steps };

@@ -228,14 +228,25 @@ fn instructions(function: &ModuleFunction) -> impl Iterator<Item = (usize, Instr
 /// Returns whether the program reads the clock, so that the time may decide what it does, or may do so by
 /// code that it makes while it runs.
 pub fn reads_clock(program: &Program) -> bool {
+    may_call(program, |symbol| {
+        Builtin::named(symbol).is_some_and(|builtin| builtin.info().shares == Shares::Clock)
+            || symbol.is_in(CL_PACKAGE) && CLOCKS.contains(&symbol.name())
+    })
+}
+
+/// Returns whether the program counts signals, so that their number may decide what it does, or may do so by
+/// code that it makes while it runs.
+pub fn counts_signals(program: &Program) -> bool {
+    may_call(program, |symbol| Builtin::named(symbol) == Some(Builtin::EventCount))
+}
+
+/// Returns whether a program names a function that `is_meant`, or makes code while it runs.
+fn may_call(program: &Program, is_meant: impl Fn(&Symbol) -> bool) -> bool {
     let module = program.module();
     module.functions.iter().any(|function| {
         instructions(function).any(|(_, instr)| {
             function_named(module, function, instr).is_some_and(|symbol| {
-                let is_clock = |builtin: Builtin| builtin.info().shares == Shares::Clock;
-                Builtin::named(&symbol).is_some_and(is_clock)
-                    || symbol.is_in(CL_PACKAGE) && CLOCKS.contains(&symbol.name())
-                    || kinds_of_function(&symbol).contains(&UnseenKind::Code)
+                is_meant(&symbol) || kinds_of_function(&symbol).contains(&UnseenKind::Code)
             })
         })
     })

@@ -70,12 +70,11 @@ pub(super) fn new_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// Creates a record of what this task reads, for a watch or `NIL`.
 fn make_reads(vm: &mut Vm, watch: Value) -> Outcome {
-    let any = event::count(&vm.heap, vm.scheduler.any_event);
+    let any = event::mark(&mut vm.heap, vm.scheduler.any_event)?;
     let mut fields = [Value::NIL; reads::LENGTH];
     fields[reads::TASK] = vm.scheduler.task().object;
-    fields[reads::COUNT] = Value::small(0);
     fields[reads::WATCH] = watch;
-    fields[reads::ANY] = Value::fixnum(any).unwrap_or(Value::NIL);
+    fields[reads::ANY] = any;
     Ok(vm.heap.alloc_vector(&fields)?)
 }
 
@@ -85,14 +84,14 @@ pub(super) fn noted_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(slots) = vm.heap.slots::<{ source::SEEN + 1 }>(fluent, Kind::SimpleVector) else {
         return Ok(Value::NIL);
     };
-    let (value, seen) = (slots[source::VALUE], slots[source::SEEN]);
+    let value = slots[source::VALUE];
     if let Some(slots) = vm.heap.slots::<{ reads::WATCH + 1 }>(reads, Kind::SimpleVector)
         && slots[reads::TASK] == vm.scheduler.task().object
     {
         if slots[reads::WATCH].is_true() {
             return Err(Exit::Slowly);
         }
-        if seen != reads {
+        if !is_noted(&vm.heap, fluent, reads) {
             note_source(vm, fluent, reads)?;
         }
     }
@@ -101,47 +100,93 @@ pub(super) fn noted_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn note_read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [source, reads] = exactly(arguments);
-    let is_new = vm.heap.slot_or_nil(source, source::SEEN) != reads;
+    let is_new = !is_noted(&vm.heap, source, reads);
     if is_new {
         note_source(vm, source, reads)?;
     }
     Ok(Value::boolean(is_new))
 }
 
-/// Notes that a form has read a source, which was not noted yet, with the count of its event.
+pub(super) fn noted_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [source, reads] = exactly(arguments);
+    Ok(Value::boolean(is_noted(&vm.heap, source, reads)))
+}
+
+/// Number of noted sources up to which the list of them is searched. Of more, each knows the reads in which
+/// it was noted last.
+const FEW: usize = 8;
+
+/// Returns up to [`FEW`] of the sources noted in `reads`, the latest first.
+#[inline]
+fn latest_sources(heap: &Heap, reads: Value) -> SmallVec<[Value; FEW]> {
+    let mut latest = SmallVec::new();
+    let mut rest = heap.slot_or_nil(reads, reads::SOURCES);
+    while let Some(pair) = heap.as_cons(rest)
+        && latest.len() < FEW
+    {
+        latest.push(pair.car);
+        rest = pair.cdr;
+    }
+    latest
+}
+
+/// Returns whether a source is noted as read.
+#[inline]
+fn is_noted(heap: &Heap, source: Value, reads: Value) -> bool {
+    let latest = latest_sources(heap, reads);
+    latest.contains(&source) || latest.len() == FEW && heap.slot_or_nil(source, source::SEEN) == reads
+}
+
+/// Notes that a form has read a source, which was not noted yet, with the mark of its event.
 #[inline]
 fn note_source(vm: &mut Vm, source: Value, reads: Value) -> Result<(), Exit> {
     vm.scheduler.point_of_read()?;
     let heap = &mut vm.heap;
-    let Some(slots) = heap.slots::<{ reads::COUNT + 1 }>(reads, Kind::SimpleVector) else { return Ok(()) };
-    let sources = slots[reads::SOURCES];
-    let sum = slots[reads::COUNT]
-        .as_fixnum()
-        .unwrap_or(0)
-        .wrapping_add(event::count(heap, heap.slot_or_nil(source, source::EVENT)));
-    let all = heap.cons(source, sources)?;
-    heap.record_set(reads, Kind::SimpleVector, reads::SOURCES, all);
-    heap.record_set(reads, Kind::SimpleVector, reads::COUNT, Value::fixnum(sum).unwrap_or(Value::small(0)));
-    heap.record_set(source, Kind::SimpleVector, source::SEEN, reads);
+    let Some(slots) = heap.slots::<{ reads::ANY + 1 }>(reads, Kind::SimpleVector) else { return Ok(()) };
+    let (sources, marks) = (slots[reads::SOURCES], slots[reads::MARKS]);
+    let mark = event::mark(heap, heap.slot_or_nil(source, source::EVENT))?;
+    let sources = heap.cons(source, sources)?;
+    let marks = heap.cons(mark, marks)?;
+    let before = latest_sources(heap, reads);
+    heap.record_set(reads, Kind::SimpleVector, reads::SOURCES, sources);
+    heap.record_set(reads, Kind::SimpleVector, reads::MARKS, marks);
+    heap.record_set(reads, Kind::SimpleVector, reads::ANY, Value::NIL);
+    if before.len() + 1 >= FEW {
+        heap.record_set(source, Kind::SimpleVector, source::SEEN, reads);
+    }
+    if before.len() + 1 == FEW {
+        for other in before {
+            heap.record_set(other, Kind::SimpleVector, source::SEEN, reads);
+        }
+    }
     Ok(())
 }
 
-/// Returns the events whose signals a form is to be evaluated after, with the sum of their counts from before
-/// it was: those of what it has read; of all, if it has read nothing or too much.
-fn events_of_reads(vm: &Vm, reads: Value) -> (SmallVec<[Value; 4]>, i64) {
-    let number = |field| vm.heap.slot_or_nil(reads, field).as_fixnum().unwrap_or(0);
+/// Returns the events whose signals a form is to be evaluated after: those of what it has read; any, if it
+/// has read nothing or too much. `None` if there was one since it has read them.
+fn events_of_reads(vm: &mut Vm, reads: Value) -> Option<SmallVec<[Value; 4]>> {
     let mut events = SmallVec::new();
     let mut rest = vm.heap.slot_or_nil(reads, reads::SOURCES);
-    while let Some(pair) = vm.heap.as_cons(rest)
-        && events.len() <= MOST_SOURCES
-    {
-        events.push(vm.heap.slot_or_nil(pair.car, source::EVENT));
-        rest = pair.cdr;
+    let mut marks = vm.heap.slot_or_nil(reads, reads::MARKS);
+    let mut count = 0;
+    while let (Some(source), Some(mark)) = (vm.heap.as_cons(rest), vm.heap.as_cons(marks)) {
+        let event = vm.heap.slot_or_nil(source.car, source::EVENT);
+        count += 1;
+        if event::is_over(&vm.heap, event, mark.car) {
+            return None;
+        }
+        if count <= MOST_SOURCES {
+            events.push(event);
+        }
+        (rest, marks) = (source.cdr, mark.cdr);
     }
-    if events.is_empty() || events.len() > MOST_SOURCES {
-        return (SmallVec::from_elem(vm.scheduler.any_event, 1), number(reads::ANY));
+    vm.exchange.charge_elements(count);
+    if (1..=MOST_SOURCES).contains(&count) {
+        return Some(events);
     }
-    (events, number(reads::COUNT))
+    let any = vm.scheduler.any_event;
+    let is_over = count == 0 && event::is_over(&vm.heap, any, vm.heap.slot_or_nil(reads, reads::ANY));
+    (!is_over).then(|| SmallVec::from_elem(any, 1))
 }
 
 pub(super) fn wait_for_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -157,29 +202,13 @@ pub(super) fn wait_for_reads(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     vm.scheduler.point()?;
     let options = WaitOptions { what, ..WaitOptions::default() };
-    if let Some((event, count)) = only_event(&vm.heap, reads) {
-        if event::count(&vm.heap, event) != count {
-            return make_reads(vm, Value::NIL);
-        }
-        let wait = begin_wait(vm, event, options)?;
-        return vm.scheduler.park_at(wait, None);
-    }
-    let (events, count) = events_of_reads(vm, reads);
-    vm.exchange.charge_elements(events.len());
-    let now = events.iter().fold(0_i64, |sum, &event| sum.wrapping_add(event::count(&vm.heap, event)));
-    if now != count {
-        return make_reads(vm, Value::NIL);
-    }
-    let events = vm.heap.list(&events)?;
+    let Some(events) = events_of_reads(vm, reads) else { return make_reads(vm, Value::NIL) };
+    let events = match events[..] {
+        [event] => event,
+        _ => vm.heap.list(&events)?,
+    };
     let wait = begin_wait(vm, events, options)?;
     vm.scheduler.park_at(wait, None)
-}
-
-/// Returns the event of what a form has read, with its count from before, if that is one source.
-fn only_event(heap: &Heap, reads: Value) -> Option<(Value, i64)> {
-    let slots = heap.slots::<{ reads::COUNT + 1 }>(reads, Kind::SimpleVector)?;
-    let sources = heap.as_cons(slots[reads::SOURCES]).filter(|sources| sources.cdr.is_nil())?;
-    Some((heap.slot_or_nil(sources.car, source::EVENT), slots[reads::COUNT].as_fixnum()?))
 }
 
 // ---- resources

@@ -47,6 +47,7 @@ fn is_negative(heap: &Heap, seconds: Value) -> bool {
 
 /// Returns the time of the running task's clock.
 fn time_of_task(vm: &mut Vm) -> u64 {
+    vm.scheduler.points.note_clock_read();
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
     vm.scheduler.standstill().time_at(now)
 }
@@ -70,6 +71,26 @@ fn count_of_events(vm: &mut Vm, events: Value) -> Result<i64, Exit> {
     Ok(sum)
 }
 
+/// Returns the mark of an event, or the list of those of a list of events.
+fn marks_of_events(vm: &mut Vm, events: Value) -> Outcome {
+    if !events.is_list() {
+        return if event::is_event(&vm.heap, events) {
+            Ok(event::mark(&mut vm.heap, events)?)
+        } else {
+            vm.exchange.not_a(events, vm.names.known.event)
+        };
+    }
+    let mut marks = listed_events(vm, events)?;
+    for mark in &mut marks {
+        if !event::is_event(&vm.heap, *mark) {
+            return vm.exchange.not_a(*mark, vm.names.known.event);
+        }
+        *mark = event::mark(&mut vm.heap, *mark)?;
+    }
+    vm.exchange.charge_elements(marks.len());
+    Ok(vm.heap.list(&marks)?)
+}
+
 /// Returns the items of a list of events to wait for.
 ///
 /// # Errors
@@ -83,13 +104,32 @@ fn listed_events(vm: &mut Vm, events: Value) -> Result<Vec<Value>, Exit> {
     }
 }
 
-/// Returns whether a wait need not begin because the events were signalled since they were counted.
-fn was_signalled_since(vm: &mut Vm, events: Value, count: Value) -> Result<bool, Exit> {
-    match count.as_fixnum() {
-        Some(count) => Ok(count_of_events(vm, events)? != count),
-        None if count.is_nil() => Ok(false),
-        None => vm.exchange.type_error(count, "INTEGER"),
+/// Returns whether a wait need not begin because the events were signalled since: since they were counted, or
+/// since their marks were taken.
+fn was_signalled_since(vm: &mut Vm, events: Value, since: Value) -> Result<bool, Exit> {
+    if let Some(count) = since.as_fixnum() {
+        return Ok(count_of_events(vm, events)? != count);
     }
+    if since.is_nil() {
+        return Ok(false);
+    }
+    if event::is_mark(&vm.heap, since) {
+        return Ok(event::is_over(&vm.heap, events, since));
+    }
+    let (mut events, mut marks) = (events, since);
+    while let (Some(event), Some(mark)) = (vm.heap.as_cons(events), vm.heap.as_cons(marks)) {
+        if !event::is_mark(&vm.heap, mark.car) {
+            break;
+        }
+        if event::is_over(&vm.heap, event.car, mark.car) {
+            return Ok(true);
+        }
+        (events, marks) = (event.cdr, mark.cdr);
+        if events.is_nil() && marks.is_nil() {
+            return Ok(false);
+        }
+    }
+    vm.exchange.type_error(since, "INTEGER")
 }
 
 /// Takes the oldest signal that one of `events` keeps, an event or a list of events: the list of its
@@ -221,13 +261,13 @@ pub(super) fn event_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !event::is_event(&vm.heap, arguments[0]) {
         return vm.exchange.not_a(arguments[0], vm.names.known.event);
     }
-    Ok(vm.heap.slot_or_nil(arguments[0], event::COUNT))
+    let count = event::count(&vm.heap, arguments[0]);
+    Ok(Value::fixnum(count).unwrap_or(Value::small(0)))
 }
 
-pub(super) fn count_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+pub(super) fn mark_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
-    let sum = count_of_events(vm, arguments[0])?;
-    Ok(Value::fixnum(sum).unwrap_or(Value::small(0)))
+    marks_of_events(vm, arguments[0])
 }
 
 pub(super) fn event_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {

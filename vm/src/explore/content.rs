@@ -76,6 +76,10 @@ impl VisitScheduler for Walk<'_> {
         }
     }
 
+    fn any_event(&mut self, scheduler: &Scheduler) {
+        self.value(scheduler.any_event);
+    }
+
     /// Mixes in the timers, in order: time, task and action.
     fn timers(&mut self, scheduler: &Scheduler) {
         for timer in scheduler.timers.in_order() {

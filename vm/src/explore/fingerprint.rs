@@ -183,12 +183,15 @@ impl Fingerprints {
             digest.add(now);
         }
         let histories = vm.names.find_class(vm.names.known.history);
-        let mut walk = Walk { vm, known: self, digest, met, next: 0, now, task: None, histories, is_strict };
+        let marks = Vec::new();
+        let mut walk =
+            Walk { vm, known: self, digest, met, next: 0, marks, now, task: None, histories, is_strict };
         walk.machine(walk.vm);
         while let Some(&object) = walk.met.get(walk.next) {
             walk.next += 1;
             walk.object(object);
         }
+        walk.marks();
         let Walk { digest, met, .. } = walk;
         self.met = met;
         digest.bits()
@@ -217,6 +220,8 @@ pub(super) struct Walk<'a> {
     /// The objects that were met, and how many of them were looked into.
     met: Vec<Value>,
     next: usize,
+    /// The marks of the events that were met, or their counts.
+    marks: Vec<Value>,
     /// The time to which others are relative.
     now: u64,
     /// The task that is being visited.
@@ -409,7 +414,11 @@ impl Walk<'_> {
                 let is_alive = slots[event::STATE].is_fixnum();
                 for (index, v) in slots.into_iter().enumerate() {
                     // Where it is, and what it belongs to.
-                    if self.is_strict || !(is_alive && (index == event::STATE || index == event::RESULT)) {
+                    if index == event::COUNT {
+                        self.count(v);
+                    } else if self.is_strict
+                        || !(is_alive && (index == event::STATE || index == event::RESULT))
+                    {
                         self.value(v);
                     }
                 }
@@ -430,11 +439,36 @@ impl Walk<'_> {
             // The place at which a failure began makes no difference.
             Kind::Structure if !self.is_strict && self.is_history(v) => {}
             Kind::Package | Kind::Class => self.digest.add_text(&vm.describe(v)),
+            Kind::Event => {
+                for (index, &v) in vm.heap.record(v, Kind::Event).unwrap_or_default().iter().enumerate() {
+                    if index == event::COUNT { self.count(v) } else { self.value(v) }
+                }
+            }
+            Kind::Tag if !self.has_counts() && event::is_mark(&vm.heap, v) => {}
             kind if kind.is_record() => {
                 let slots = vm.heap.record(v, kind).unwrap_or_default();
                 self.values(slots);
             }
             _ => self.raw(v),
+        }
+    }
+
+    /// Whether states differ by how often events were signalled.
+    fn has_counts(&self) -> bool {
+        self.is_strict || self.vm.scheduler.points.has_counts
+    }
+
+    /// Mixes in the count of an event, if that belongs to a state. Its mark is mixed in at the end, if something
+    /// else knows it.
+    fn count(&mut self, v: Value) {
+        if self.has_counts() { self.value(v) } else { self.marks.push(v) }
+    }
+
+    /// Mixes in the marks of all events that were met, in order. All that knows one of them was met before.
+    fn marks(&mut self) {
+        for mark in std::mem::take(&mut self.marks) {
+            let number = if mark.is_address() { self.known.numbers.of(mark, u32::MAX) } else { u32::MAX };
+            self.word(u64::from(number));
         }
     }
 

@@ -30,7 +30,7 @@ define_records! {
     source { EVENT, VALUE, SEEN, USERS, WATCHES, PATTERN, TABLE, KEY }
 
     /// The sources that a form has read.
-    reads { TASK, SOURCES, COUNT, WATCH, ANY, FACTS }
+    reads { TASK, SOURCES, MARKS, WATCH, ANY, FACTS }
 
     /// A resource.
     resource {

@@ -1,5 +1,10 @@
 //! Events: objects of the heap with a count of their signals and a list of the waits for them.
 //!
+//! Who looks at something and then waits for its changes has to know whether an event was signalled meanwhile.
+//! The library does not compare counts for that, but takes a *mark* of the event, which the next signal takes
+//! away: two states of a program that differ by how often something has happened, but not by what is still to
+//! be seen of it, are one state to an exploration.
+//!
 //! A task is an event too, which its checkpoints and its end signal; its slots are those of an event and a
 //! few more.
 
@@ -9,7 +14,7 @@ use crate::value::Value;
 
 /// Slot: name, any value or `NIL`.
 pub(crate) const NAME: usize = 0;
-/// Slot: number of signals so far.
+/// Slot: number of signals so far; or a mark that carries it, if there is one of the time since the last one.
 pub(crate) const COUNT: usize = 1;
 /// Slot: link of the wait that began first, or `NIL`.
 pub(crate) const FIRST: usize = 2;
@@ -46,7 +51,40 @@ pub(crate) fn is_event(heap: &Heap, object: Value) -> bool {
 /// Returns how often an event was signalled.
 #[inline]
 pub(crate) fn count(heap: &Heap, event: Value) -> i64 {
-    heap.slot_or_nil(event, COUNT).as_fixnum().unwrap_or(0)
+    count_in(heap, heap.slot_or_nil(event, COUNT))
+}
+
+/// Returns the count that is in the slot of an event.
+#[inline]
+fn count_in(heap: &Heap, slot: Value) -> i64 {
+    slot.as_fixnum().or_else(|| heap.slot_or_nil(slot, 0).as_fixnum()).unwrap_or(0)
+}
+
+/// What [`Kind::Tag`] has as `aux` if it is a mark.
+pub(crate) const MARK: u16 = 1;
+
+/// Returns the mark of an event: another object after its next signal.
+///
+/// # Errors
+/// As for every allocation.
+#[inline]
+pub(crate) fn mark(heap: &mut Heap, event: Value) -> Result<Value, AllocError> {
+    let slot = heap.slot_or_nil(event, COUNT);
+    let (Some(kind), true) = (heap.kind(event), slot.is_fixnum()) else { return Ok(slot) };
+    let mark = heap.alloc_record(Kind::Tag, 0, MARK, &[slot])?;
+    heap.record_set(event, kind, COUNT, mark);
+    Ok(mark)
+}
+
+/// Returns whether an event was signalled since its mark was taken.
+#[inline]
+pub(crate) fn is_over(heap: &Heap, event: Value, mark: Value) -> bool {
+    heap.slot_or_nil(event, COUNT) != mark
+}
+
+/// Returns whether an object is a mark.
+pub(crate) fn is_mark(heap: &Heap, object: Value) -> bool {
+    heap.header(object).is_some_and(|header| header.kind == Kind::Tag && header.aux == MARK)
 }
 
 /// Counts a signal of an event.
@@ -55,7 +93,7 @@ pub(crate) fn count_signal(heap: &mut Heap, event: Value) {
     let Some(kind) = heap.kind(event) else { return };
     // One slot is set alone: while the collector marks, setting several costs more.
     let Some(&[_, count]) = heap.slots(event, kind) else { return };
-    let count = count.as_fixnum().unwrap_or(0) + 1;
+    let count = count_in(heap, count) + 1;
     heap.record_set(event, kind, COUNT, Value::fixnum(count).unwrap_or(Value::small(0)));
 }
 

@@ -79,7 +79,7 @@ fn a_count_is_tested_and_waited_for_in_one_step() {
         "(task-net (a (hold)) (b (hold)))
          (print (locks))",
         &["0"],
-        &[("locks.esl", "(%wait (%lock-event lock) count", "(%wait (%lock-event lock) nil")],
+        &[("locks.esl", "(%wait (%lock-event lock) mark", "(%wait (%lock-event lock) nil")],
     );
 }
 
@@ -227,8 +227,8 @@ fn a_violation_before_the_daemon_first_waits_is_restored() {
         &[":ON ENDED"],
         &[(
             "locks.esl",
-            "(let ((count (event-count *%violation*)))",
-            "(%wait *%violation* (event-count *%violation*) nil) (let ((count (event-count *%violation*)))",
+            "(let ((mark (%mark-events *%violation*)))",
+            "(%wait *%violation* (%mark-events *%violation*) nil) (let ((mark (%mark-events *%violation*)))",
         )],
     );
 }
