@@ -207,6 +207,7 @@ pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(status) = status else {
         return vm.exchange.raise(Raised::Type(arguments[0], Expected::Index(256)));
     };
+    vm.scheduler.points.note_shown();
     vm.outside.exit_status = Some(status);
     run::abort_others(vm);
     vm.scheduler.task_mut().begin_end(TaskEnd::Aborted);

@@ -10,6 +10,7 @@
 //! trace         one run of the search, and taking in what it has come by
 //! worker        this thread, or several, among which the runs are divided
 //! keep          returning to places of that tree
+//! left_out      points that make no difference, and what shows that they do
 //! livelock      ways round that are fair to all
 //! random        runs by random priorities
 //! ```
@@ -27,10 +28,9 @@
 //! calls a search complete has to know that the program has none. Where a program itself chooses, by
 //! `choose`, each way is tried. A task that reaches no point is stopped after [`Settings::turn`] ticks.
 //!
-//! **Points that are left out.** The ticks inside of cleanup forms and limits matter only where a request
-//! reaches a task that could run: to end, to leave a form, or an interrupt. So a search at grain `variables`
-//! begins without these points, and begins again with them when a run has shown such a request. The choices
-//! of its findings have those at the points that were left out, too, so [`Vm::follow`] need not know them.
+//! **Points that are left out.** A search at grain `variables` begins without points that rarely matter, and
+//! begins again with those that a run has shown to be needed (see `left_out`). The choices of its findings
+//! have those at the points that were left out, too, so [`Vm::follow`] need not know them.
 //!
 //! **Choices.** At each point any runnable task may continue, whatever its priority (every task has a turn at
 //! some time). The task that has just run comes first, then the others from the oldest to the newest; a
@@ -59,6 +59,7 @@ mod content;
 mod digest;
 mod fingerprint;
 mod keep;
+mod left_out;
 mod live;
 mod livelock;
 mod numbers;
@@ -77,6 +78,7 @@ use std::sync::{PoisonError, RwLock};
 use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
+use left_out::{Searches, ShownPoints};
 pub use point::FollowedRun;
 pub use random::{RandomRun, RandomSchedule};
 use search::Search;
@@ -138,12 +140,14 @@ pub struct Settings {
     /// Whether tasks also stop before each use of a place that others may reach, in a program that was
     /// compiled with points.
     pub strict: bool,
-    /// Whether points are left out, at grain `variables`, that matter only where requests reach tasks which
-    /// could run, until a run has shown one. The findings are the same without, in more states.
+    /// Whether points are left out, at grain `variables`, until a run has shown that they are needed. The
+    /// findings are the same without, in more states.
     pub reduce: bool,
     /// Whether states also differ by the time, because the program reads the clock. Without this, times are
     /// relative to the time of the state. At grain `ticks`, states always differ by it.
     pub clock: bool,
+    /// Whether states also differ by how often each event was signalled, because the program counts signals.
+    pub counts: bool,
 }
 
 impl Default for Settings {
@@ -161,16 +165,12 @@ impl Default for Settings {
             strict: false,
             reduce: true,
             clock: false,
+            counts: false,
         }
     }
 }
 
 impl Settings {
-    /// Returns the settings of the first search.
-    fn at_first(&self) -> Settings {
-        if self.reduce { *self } else { self.with_all_points() }
-    }
-
     /// Returns the settings of a search that leaves no points out. At a tick a task may hold a time that the
     /// library has read, as the deadline of a sleep; so where ticks are points, states differ by the time.
     fn with_all_points(&self) -> Settings {
@@ -332,14 +332,16 @@ pub fn explore_while<C, T: PartialEq + Clone, E>(
 ) -> Result<Exploration<T>, E> {
     let mut subject = TwoFunctions { present: None, begin, judge };
     let mut goes_on = goes_on;
-    for settings in [settings.at_first(), settings.with_all_points()] {
+    let mut searches = Searches::new(settings);
+    loop {
+        let (settings, needed) = searches.next();
         let search = RwLock::new(Search::default());
-        let mut alone = SingleWorker::new(&settings, &search, &mut subject);
-        if let Some(found) = search_by(&settings, &search, &mut alone, &mut goes_on)? {
-            return Ok(found);
+        let mut alone = SingleWorker::new((&settings, &needed), &search, &mut subject);
+        match search_by(&settings, &search, &mut alone, &mut goes_on)? {
+            Ok(found) => return Ok(found),
+            Err(shown) => searches.learn(shown),
         }
     }
-    unreachable!("a search with all points is not left for one with more")
 }
 
 /// Calls functions in threads of their own and the last one in this thread, and waits for all of them.
@@ -361,9 +363,11 @@ pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
         return explore_while(settings, begin, judge, goes_on);
     }
     let subject = || TwoFunctions { present: None, begin: &begin, judge: &judge };
-    for settings in [settings.at_first(), settings.with_all_points()] {
+    let mut searches = Searches::new(settings);
+    loop {
+        let (settings, needed) = searches.next();
         let (search, stop) = (RwLock::new(Search::default()), AtomicBool::new(false));
-        let (pool, works) = WorkerPool::new(jobs, &settings, (&search, &stop), &subject);
+        let (pool, works) = WorkerPool::new(jobs, (&settings, &needed), (&search, &stop), &subject);
         let (mut pool, mut found) = (Some(pool), None);
         side_by_side(works, &mut || {
             // The threads end when the pool is dropped.
@@ -371,23 +375,23 @@ pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
                 found = Some(search_by(&settings, &search, &mut pool, &mut goes_on));
             }
         });
-        if let Some(found) = found.expect("the last function was called")? {
-            return Ok(found);
+        match found.expect("the last function was called")? {
+            Ok(found) => return Ok(found),
+            Err(shown) => searches.learn(shown),
         }
     }
-    unreachable!("a search with all points is not left for one with more")
 }
 
 /// Runs of a batch: few enough that the shortest schedules come first, and enough for all threads.
 const BATCH: usize = 64;
 
-/// Searches with the help of workers. Returns `None` if points that are left out have shown to be needed.
+/// Searches with the help of workers; `Err` if points that are left out have shown to be needed.
 fn search_by<T: PartialEq + Clone, E>(
     settings: &Settings,
     search: &RwLock<Search>,
     workers: &mut dyn Workers<T, E>,
     goes_on: &mut dyn FnMut(&SearchProgress) -> bool,
-) -> Result<Option<Exploration<T>>, E> {
+) -> Result<Result<Exploration<T>, ShownPoints>, E> {
     let write = || search.write().unwrap_or_else(PoisonError::into_inner);
     write().begin();
     let mut endings: Vec<ExploredEnding<T>> = Vec::new();
@@ -404,8 +408,10 @@ fn search_by<T: PartialEq + Clone, E>(
         let mut traces = workers.run(places.clone(), &mut |more| {
             goes_on(&SearchProgress { states: progress.states + more, ..progress })
         })?;
-        if settings.reduce && traces.iter().any(|trace| trace.was_requested) {
-            return Ok(None);
+        let mut shown = ShownPoints::default();
+        traces.iter_mut().for_each(|trace| shown.add(std::mem::take(&mut trace.shown)));
+        if !shown.is_nothing() {
+            return Ok(Err(shown));
         }
         let search = &mut *write();
         search.settled();
@@ -456,5 +462,5 @@ fn search_by<T: PartialEq + Clone, E>(
         let before = search.choices_to_state(lap.state);
         Livelock { lap: before.len(), choices: [before, lap.choices].concat() }
     });
-    Ok(Some(Exploration { states, runs, endings, endless, livelock, has_cycle, limit }))
+    Ok(Ok(Exploration { states, runs, endings, endless, livelock, has_cycle, limit }))
 }

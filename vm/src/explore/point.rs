@@ -1,7 +1,10 @@
 //! Running from point to point.
 
+use std::sync::Arc;
+
 use smallvec::SmallVec;
 
+use super::left_out::{LeftOut, TickPlace};
 use super::step::{
     Runnable, ScheduleEvent, ScheduleStep, TellStep, is_of_library, switch, tell_step, tell_uses,
 };
@@ -130,8 +133,10 @@ fn follow(
 pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.scheduler.points.grain = Some(settings.grain);
     vm.scheduler.points.is_strict = settings.strict;
+    vm.scheduler.points.is_timed = settings.timers == TimerGrain::Any;
     // At a tick a task may hold a time that the library has read, such as the deadline of a sleep; relative
     // times do not tell whether that has passed.
+    vm.scheduler.points.has_counts = settings.counts;
     vm.scheduler.points.has_clock = settings.clock || settings.grain == Grain::Ticks;
     vm.config.slice = match settings.grain {
         Grain::Changes | Grain::Reads => settings.turn,
@@ -167,6 +172,22 @@ struct UnseenWay {
     ticks: u32,
     /// Ticks after which there is a point in any case.
     most: u32,
+    /// The tick after the last action that others can see, if that was left out.
+    last_action: Option<TickPlace>,
+    /// What was written and called outside when that was left out.
+    outside: (u64, u64),
+}
+
+impl UnseenWay {
+    /// Returns whether the last turn has done something before which others had no choice to go.
+    fn is_sudden(&self, vm: &Vm) -> bool {
+        vm.scheduler.points.is_sudden || self.outside != outside(vm)
+    }
+}
+
+/// Returns what tells whether something was written, if states differ by it, or called outside.
+fn outside(vm: &Vm) -> (u64, u64) {
+    (vm.outside.console.noted(), vm.outside.calls)
 }
 
 /// Says which of the tasks continues at a point, or `None` to give up the run.
@@ -185,6 +206,8 @@ impl PointRun {
                 watched: 0,
                 ticks: 0,
                 most: settings.turn,
+                last_action: None,
+                outside: (0, 0),
             }),
             skipped: 0,
         }
@@ -203,13 +226,33 @@ impl PointRun {
 
     /// Runs from point to point, up to so many ticks of the whole run; at each, `choose` says which task
     /// continues. It is given the run as it stands, from which [`PointRun::go_on`] comes to the same choice
-    /// again. With a flag, points are left out that are needed only where requests reach tasks that could
-    /// run; it is set if one does. Returns how the run has ended, unless it was given up.
+    /// again. Points are left out as `left_out` says, which takes note of what shows that they are needed.
+    /// Returns how the run has ended, unless it was given up.
     pub(super) fn go_on(
         &mut self,
         vm: &mut Vm,
         end: u64,
-        mut requested: Option<&mut bool>,
+        mut left_out: Option<&mut LeftOut<'_>>,
+        choose: &mut Choose<'_>,
+    ) -> Option<RunOutcome> {
+        let outcome = self.go_from_point_to_point(vm, end, left_out.as_deref_mut(), choose);
+        if let Some(left_out) = left_out {
+            // No tick comes after the last actions of a run.
+            if outcome.is_some()
+                && let Some(way) = &self.unseen
+            {
+                left_out.shown.places.extend(way.last_action.filter(|_| way.is_sudden(vm)));
+            }
+            left_out.take_variables(vm);
+        }
+        outcome
+    }
+
+    fn go_from_point_to_point(
+        &mut self,
+        vm: &mut Vm,
+        end: u64,
+        mut left_out: Option<&mut LeftOut<'_>>,
         choose: &mut Choose<'_>,
     ) -> Option<RunOutcome> {
         loop {
@@ -224,7 +267,7 @@ impl PointRun {
                 if let Some(outcome) = self.come_to_point(vm) {
                     return Some(outcome);
                 }
-                if let Some(index) = self.goes_on_unseen(vm, requested.as_deref_mut()) {
+                if let Some(index) = self.goes_on_unseen(vm, left_out.as_deref_mut()) {
                     run::give_turn(vm, index, end);
                     continue;
                 }
@@ -276,38 +319,67 @@ impl PointRun {
         }
     }
 
+    /// Returns whether the task that ran last has done something that others can see since its last point, which
+    /// matters where it chooses a way: there, no other task may go.
+    pub(super) fn has_open_action(&self, vm: &Vm) -> bool {
+        let points = &vm.scheduler.points;
+        let is_open = |way: &UnseenWay| way.last_action.is_some() || points.has_shown;
+        points.asked.is_some() && self.unseen.as_ref().is_some_and(is_open)
+    }
+
     /// Returns the task that ran last if it stands at a tick that is not a point: if others have seen nothing
     /// of it since its last point, giving way here would be as giving way there.
-    fn goes_on_unseen(&mut self, vm: &mut Vm, requested: Option<&mut bool>) -> Option<TaskIndex> {
+    fn goes_on_unseen(&mut self, vm: &mut Vm, mut left_out: Option<&mut LeftOut<'_>>) -> Option<TaskIndex> {
         let way = self.unseen.as_mut()?;
         let symbols = vm.names.symbol_count();
         if way.watched != symbols {
             watch_variables(vm);
             way.watched = symbols;
+            vm.scheduler.points.raced = left_out.as_ref().map(|left_out| Arc::new(left_out.raced(vm)));
         }
+        if vm.scheduler.points.asked.is_some() {
+            // No other task may go here, so this is no end of the way.
+            return None;
+        }
+        let (last_action, is_sudden) = (way.last_action.take(), way.is_sudden(vm));
         let points = &mut vm.scheduler.points;
-        let (has_shown, was_hit) =
-            (std::mem::take(&mut points.has_shown), std::mem::take(&mut points.was_hit));
-        let leaves_out = requested.is_some();
-        if let Some(requested) = requested {
-            *requested |= was_hit;
-        }
+        let has_shown = std::mem::take(&mut points.has_shown);
+        let is_seen = std::mem::take(&mut points.is_seen);
+        let was_hit = std::mem::take(&mut points.was_hit);
+        points.is_sudden = false;
         let ticks = std::mem::take(&mut way.ticks) + 1;
-        if has_shown || ticks >= way.most || vm.scheduler.points.asked.is_some() {
+        if let Some(left_out) = &mut left_out {
+            left_out.shown.requests |= was_hit;
+            left_out.shown.places.extend(last_action.filter(|_| is_sudden));
+        }
+        if has_shown && left_out.is_none() || ticks >= way.most {
             return None;
         }
         let (_, index) = runnable_tasks(vm).find(|&(number, _)| number == self.last)?;
         let task = vm.scheduler.tasks.at(index).filter(|task| !task.flags.at_point())?;
         // An abort cuts off the rest of the task, of which others may see each part.
-        if vm.scheduler.points.has_guards || task.control.get().is_some_and(depends_on_place) {
-            if !leaves_out {
-                return None;
+        let depends_on_place =
+            vm.scheduler.points.has_guards || task.control.get().is_some_and(depends_on_place);
+        let is_left_out = match left_out {
+            None if depends_on_place => return None,
+            None => false,
+            Some(left_out) if is_seen => {
+                let place = TickPlace::of(vm, index);
+                if left_out.needed.places.contains(&place) {
+                    return None;
+                }
+                (way.last_action, way.outside) = (Some(place), outside(vm));
+                true
             }
-            if runnable_tasks(vm).count() > 1 || self.has_timers && time_may_pass(vm) {
-                self.skipped += 1;
+            Some(_) => {
+                way.last_action = last_action;
+                has_shown || depends_on_place
             }
-        } else {
+        };
+        if !is_left_out {
             way.ticks = ticks;
+        } else if runnable_tasks(vm).count() > 1 || self.has_timers && time_may_pass(vm) {
+            self.skipped += 1;
         }
         Some(index)
     }

@@ -4,6 +4,7 @@ use smallvec::SmallVec;
 
 use super::Subject;
 use super::keep::Keeper;
+use super::left_out::{LeftOut, NeededPoints, ShownPoints};
 use super::livelock::{NO_TASK, StateStep, StateTasks, StepCause, TIME};
 use super::point::{PointRun, living_tasks};
 use super::search::{MadeChoice, ROOT, Search};
@@ -100,21 +101,26 @@ pub(super) enum TraceEnd<T> {
 pub(super) struct RunTrace<T> {
     pub(super) steps: Vec<TraceStep>,
     pub(super) end: TraceEnd<T>,
-    /// Whether a request has reached a task that could run.
-    pub(super) was_requested: bool,
+    /// The points that it has shown to be needed.
+    pub(super) shown: ShownPoints,
 }
 
 /// A machine of a search with its places, and the subject that began it.
 pub(super) struct Tracer<'a, S> {
     settings: &'a Settings,
+    needed: &'a NeededPoints,
     keeper: Keeper<'a>,
     subject: S,
 }
 
 impl<'a, S: Subject> Tracer<'a, S> {
     /// Creates a tracer that may take so many bytes for snapshots.
-    pub(super) fn new(settings: &'a Settings, memory: usize, subject: S) -> Tracer<'a, S> {
-        Tracer { settings, keeper: Keeper::new(settings, memory), subject }
+    pub(super) fn new(
+        (settings, needed): (&'a Settings, &'a NeededPoints),
+        memory: usize,
+        subject: S,
+    ) -> Tracer<'a, S> {
+        Tracer { settings, needed, keeper: Keeper::new(settings, memory), subject }
     }
 
     /// Takes note of what the search has made of the last batch.
@@ -138,8 +144,7 @@ impl<'a, S: Subject> Tracer<'a, S> {
         (number, claims): (usize, &Claims),
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Result<RunTrace<S::Ending>, S::Error> {
-        let Tracer { settings, keeper, subject } = self;
-        let mut was_requested = false;
+        let Tracer { settings, needed, keeper, subject } = self;
         let (mut machine, mut run, choices) = keeper.go_to(search, place.node, || subject.begin())?;
         let parent = search.nodes[place.node as usize].parent;
         let mut given = choices.into_iter();
@@ -147,8 +152,8 @@ impl<'a, S: Subject> Tracer<'a, S> {
         let mut end = TraceEnd::Known;
         let mut before: Option<TasksAtPoint> = None;
         let most = settings.states.min(settings.memory / STEP_BYTES);
-        let requested = settings.reduce.then_some(&mut was_requested);
-        let outcome = run.go_on(&mut machine, u64::MAX, requested, &mut |vm, run, runnable| {
+        let mut left_out = settings.reduce.then(|| LeftOut::new(needed));
+        let outcome = run.go_on(&mut machine, u64::MAX, left_out.as_mut(), &mut |vm, run, runnable| {
             if given.len() == 1 && runnable.count() > 1 {
                 keeper.keep_on_the_way(vm, run, search, parent);
             }
@@ -165,7 +170,7 @@ impl<'a, S: Subject> Tracer<'a, S> {
             if given.len() > 0 {
                 return Some(0);
             }
-            let state = keeper.fingerprints.of(vm);
+            let state = keeper.fingerprints.of(vm) ^ u128::from(run.has_open_action(vm));
             let (count, has_last) = (runnable.count(), runnable.has_last);
             let (here, tasks) = TasksAtPoint::of(vm, run, runnable);
             let unknown = StepCause { ran: NO_TASK, way: 0, keeps_tasks: false };
@@ -192,7 +197,8 @@ impl<'a, S: Subject> Tracer<'a, S> {
             end = TraceEnd::Ended(subject.judge(&mut machine, outcome));
         }
         keeper.take_back(machine);
-        Ok(RunTrace { steps, end, was_requested })
+        let shown = left_out.map_or_else(ShownPoints::default, |left_out| left_out.shown);
+        Ok(RunTrace { steps, end, shown })
     }
 }
 

@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 
+use super::left_out::{NeededPoints, ShownPoints};
 use super::search::Search;
 use super::trace::{RunTrace, TraceEnd, Tracer};
 use super::{Settings, Subject};
@@ -75,8 +76,12 @@ pub(super) struct SingleWorker<'a, S: Subject> {
 }
 
 impl<'a, S: Subject> SingleWorker<'a, S> {
-    pub(super) fn new(settings: &'a Settings, search: &'a RwLock<Search>, subject: S) -> SingleWorker<'a, S> {
-        SingleWorker { search, tracer: Tracer::new(settings, settings.memory, subject) }
+    pub(super) fn new(
+        (settings, needed): (&'a Settings, &'a NeededPoints),
+        search: &'a RwLock<Search>,
+        subject: S,
+    ) -> SingleWorker<'a, S> {
+        SingleWorker { search, tracer: Tracer::new((settings, needed), settings.memory, subject) }
     }
 }
 
@@ -165,7 +170,7 @@ impl<'a, T: Send + 'a, E: Send + 'a> WorkerPool<'a, T, E> {
     /// Creates a pool of so many workers, which the caller runs in threads. Each makes a subject of its own.
     pub(super) fn new<S: Subject<Ending = T, Error = E>>(
         jobs: usize,
-        settings: &'a Settings,
+        (settings, needed): (&'a Settings, &'a NeededPoints),
         (search, stop): (&'a RwLock<Search>, &'a AtomicBool),
         subject: &'a (impl Fn() -> S + Sync),
     ) -> (WorkerPool<'a, T, E>, Vec<PoolWorker<'a>>) {
@@ -175,7 +180,7 @@ impl<'a, T: Send + 'a, E: Send + 'a> WorkerPool<'a, T, E> {
             let (order, orders) = channel::<Arc<SharedBatch>>();
             let tell = tell.clone();
             works.push(Box::new(move || {
-                let mut tracer = Tracer::new(settings, settings.memory / jobs, subject());
+                let mut tracer = Tracer::new((settings, needed), settings.memory / jobs, subject());
                 for batch in orders {
                     let part = BatchPart { traces: Vec::new(), failed: None };
                     let mut told = TellsAtEnd { part, tell: &tell };
@@ -262,6 +267,6 @@ impl<T: Send, E: Send> Workers<T, E> for WorkerPool<'_, T, E> {
 impl<T> RunTrace<T> {
     /// Returns the trace of a run that did not begin.
     pub(super) fn stopped() -> RunTrace<T> {
-        RunTrace { steps: Vec::new(), end: TraceEnd::Stopped, was_requested: false }
+        RunTrace { steps: Vec::new(), end: TraceEnd::Stopped, shown: ShownPoints::default() }
     }
 }

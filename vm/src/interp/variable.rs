@@ -20,11 +20,13 @@ use crate::vm::Vm;
 /// `symbol` is a Symbol.
 #[inline(never)]
 pub(super) unsafe fn bound_value(vm: &mut Vm, symbol: Value) -> Value {
-    vm.scheduler.points.note_shown();
     let bindings = vm.scheduler.running.as_ref().map(|task| &task.control.bindings);
     // SAFETY: by the contract this is a live Symbol.
     let global = unsafe { (*symbol.object_ptr().cast::<SymbolObject>()).value };
     let bound = bindings.and_then(|bindings| bindings.get(symbol));
+    if vm.scheduler.points.grain.is_some() {
+        vm.note_variable_read(symbol, bound.is_some(), global);
+    }
     if bound.is_none() && vm.scheduler.points.uses.is_some() {
         vm.tell_use(symbol, global, false);
     }
@@ -151,10 +153,16 @@ impl Vm {
             return self.refuse_constant(symbol, "set");
         }
         if flags & SymbolObject::EVER_BOUND != 0 {
-            self.scheduler.points.note_shown();
             let task = self.scheduler.running.as_mut();
-            if let Some(place) = task.and_then(|task| task.control.bindings.get_mut(symbol)) {
+            let bound = task.and_then(|task| task.control.bindings.get_mut(symbol));
+            let is_bound = bound.is_some();
+            if let Some(place) = bound {
                 *place = value;
+            }
+            if self.scheduler.points.grain.is_some() {
+                self.note_variable_set(symbol, is_bound);
+            }
+            if is_bound {
                 return Ok(());
             }
             if self.scheduler.points.uses.is_some() {

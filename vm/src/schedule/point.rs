@@ -4,10 +4,15 @@
 //! the processor, and when the task goes on the builtin is done again and let through. Unless schedules are
 //! explored that costs a test.
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
 use super::{Scheduler, TurnEnd};
+use crate::heap::{Heap, Kind};
 use crate::raise::Exit;
 use crate::task::{TaskEnd, TaskNumber, UnwindTarget, Unwinding};
 use crate::value::Value;
+use crate::vm::Vm;
 
 /// Kinds of operations before which a task stands at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,11 +80,24 @@ pub(crate) struct Points {
     pub(crate) grain: Option<Grain>,
     /// Whether states differ by the time.
     pub(crate) has_clock: bool,
+    /// Whether states differ by how often events were signalled.
+    pub(crate) has_counts: bool,
     /// Whether the running task may pass the point at which it stands.
     pub(crate) is_open: bool,
     /// Whether the running task has passed a point, or has done something else that other tasks can see,
     /// since the last tick.
     pub(crate) has_shown: bool,
+    /// Whether others can indeed see it: of variables, only those in a race count.
+    pub(crate) is_seen: bool,
+    /// Whether it was more than to pass a point, so that others had no choice to go first.
+    pub(crate) is_sudden: bool,
+    /// The variables in a race, as far as they are known: those that a task has set while there were others.
+    /// `None` if all variables count as such.
+    pub(crate) raced: Option<Arc<HashSet<u64>>>,
+    /// Other variables that were set while there were other tasks.
+    pub(crate) found_raced: Vec<Value>,
+    /// Whether time may pass while tasks can run.
+    pub(crate) is_timed: bool,
     /// Whether a request to end or to leave a form, or an interrupt, has reached a task that could run.
     pub(crate) was_hit: bool,
     /// Whether there are guards, which may interrupt tasks anywhere.
@@ -99,11 +117,72 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    /// Notes that the running task has done something that other tasks can see, or has looked at it.
+    /// Notes that the running task has done something that other tasks can see, or has looked at it, without
+    /// having stopped before.
     #[inline]
     pub(crate) fn note_shown(&mut self) {
-        self.has_shown |= self.grain.is_some();
+        if self.grain.is_some() {
+            (self.has_shown, self.is_seen, self.is_sudden) = (true, true, true);
+        }
     }
+
+    /// Notes that the running task has passed a point.
+    fn note_passed(&mut self) {
+        if self.grain.is_some() {
+            (self.has_shown, self.is_seen) = (true, true);
+        }
+    }
+
+    /// Notes that the running task reads the clock.
+    pub(crate) fn note_clock_read(&mut self) {
+        self.is_sudden |= self.is_timed;
+    }
+
+    /// Notes that the running task uses a variable that others may use. Unless `matters`, nobody can see it.
+    fn note_variable(&mut self, matters: bool) {
+        self.has_shown = true;
+        (self.is_seen, self.is_sudden) = (self.is_seen | matters, self.is_sudden | matters);
+    }
+}
+
+impl Vm {
+    /// Notes that the running task has read a special variable, of which `bound` is the value that it has
+    /// bound, if it has. A variable that no task sets beside others looks the same to all, unless its value is
+    /// an object with parts: that may stand for them.
+    #[cold]
+    pub(crate) fn note_variable_read(&mut self, symbol: Value, is_bound: bool, value: Value) {
+        let Vm { scheduler, heap, .. } = self;
+        if scheduler.points.grain.is_none() {
+            return;
+        }
+        let is_alone = scheduler.counts.alive <= 1;
+        let is_constant = |raced: &HashSet<u64>| {
+            is_bound || is_alone || !raced.contains(&symbol.bits()) && is_simple(heap, value)
+        };
+        let is_unseen = scheduler.points.raced.as_deref().is_some_and(is_constant);
+        scheduler.points.note_variable(!is_unseen);
+    }
+
+    /// Notes that the running task has set a special variable, which it may have bound.
+    #[cold]
+    pub(crate) fn note_variable_set(&mut self, symbol: Value, is_bound: bool) {
+        let Scheduler { points, counts, .. } = &mut self.scheduler;
+        if points.grain.is_none() {
+            return;
+        }
+        let is_unseen = points.raced.is_some() && (is_bound || counts.alive <= 1);
+        if !is_unseen && points.raced.as_ref().is_some_and(|raced| !raced.contains(&symbol.bits())) {
+            points.found_raced.push(symbol);
+        }
+        points.note_variable(!is_unseen);
+    }
+}
+
+/// Returns whether a value has no parts that can change.
+fn is_simple(heap: &Heap, value: Value) -> bool {
+    let is_atom =
+        |kind| matches!(kind, Kind::Symbol | Kind::Ratio | Kind::Complex | Kind::Float | Kind::Bignum);
+    !value.is_address() || !value.is_cons() && heap.kind(value).is_some_and(is_atom)
 }
 
 impl Scheduler {
@@ -139,7 +218,7 @@ impl Scheduler {
     #[cold]
     fn stops_here(&mut self) -> bool {
         if self.task().critical > 0 || std::mem::take(&mut self.points.is_open) {
-            self.points.note_shown();
+            self.points.note_passed();
             return false;
         }
         self.task_mut().flags.set_at_point(true);

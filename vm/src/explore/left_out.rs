@@ -1,0 +1,144 @@
+//! Points that a search at grain `variables` leaves out, and what shows that they are needed.
+//!
+//! A task has to give way between any two of its actions that others can see. Before most of them it stops:
+//! then others may go before, which is as good as after the last one, since they see nothing of what lies
+//! between. So the tick after an action is a point only if an action follows that has no point before it, a
+//! *sudden* one: the use of a variable, a new task. And a variable matters only if it is in a race: if some
+//! task sets it beside others. A constant is read by many, and a variable of the main task is set before
+//! there are others.
+//!
+//! Neither is known at the beginning. A search begins with no such points and variables. A run that comes to
+//! a sudden action, without a point since the last action, shows that the tick after that one is needed; one
+//! that sets a variable beside other tasks shows that it is in a race. Then the search begins again, with
+//! what was shown. The last one has shown nothing, so it has left out only what makes no difference. The same
+//! goes for the points inside of cleanup forms and limits, which matter where requests reach tasks that could
+//! run: then the next search leaves out nothing at all.
+//!
+//! Source: Lipton 1975 for actions that commute; Musuvathi and Qadeer 2007 for looking for races in the runs
+//! of a search that relies on their absence.
+
+use std::collections::HashSet;
+
+use esl_bytecode::symbol::Symbol;
+
+use super::Settings;
+use super::digest::Digest;
+use crate::fused::unfused;
+use crate::interp::frames::Frames;
+use crate::task::TaskIndex;
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// A place of the program at which a tick lies: a word of a code. Functions with the same code share their
+/// places, which costs states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct TickPlace(u64);
+
+impl TickPlace {
+    /// Returns the place at which a task stands.
+    pub(super) fn of(vm: &Vm, index: TaskIndex) -> TickPlace {
+        let frame = vm.scheduler.tasks.at(index).and_then(|task| Frames::of_task(task).next());
+        let Some(frame) = frame else { return TickPlace(0) };
+        let code = vm.heap.function_code(frame.function);
+        let mut digest = Digest::default();
+        digest.add(frame.word as u64);
+        let words = unfused(code.and_then(|code| vm.heap.code_words(code)).unwrap_or_default());
+        digest.add_all(words.into_iter().map(u64::from));
+        TickPlace(digest.0)
+    }
+}
+
+/// What the searches so far have shown to be needed.
+#[derive(Clone, Debug, Default)]
+pub(super) struct NeededPoints {
+    /// Ticks after actions.
+    pub(super) places: HashSet<TickPlace>,
+    /// Variables in a race.
+    pub(super) variables: HashSet<Symbol>,
+}
+
+/// What runs have shown to be needed beyond that.
+#[derive(Debug, Default)]
+pub(super) struct ShownPoints {
+    /// Whether a request to end or to leave a form, or an interrupt, has reached a task that could run.
+    pub(super) requests: bool,
+    pub(super) places: Vec<TickPlace>,
+    pub(super) variables: Vec<Symbol>,
+}
+
+impl ShownPoints {
+    /// Adds what another run has shown.
+    pub(super) fn add(&mut self, other: ShownPoints) {
+        self.requests |= other.requests;
+        self.places.extend(other.places);
+        self.variables.extend(other.variables);
+    }
+
+    /// Returns whether nothing was shown.
+    pub(super) fn is_nothing(&self) -> bool {
+        !self.requests && self.places.is_empty() && self.variables.is_empty()
+    }
+}
+
+/// Points that a run leaves out, and what it shows.
+#[derive(Debug)]
+pub(super) struct LeftOut<'a> {
+    pub(super) needed: &'a NeededPoints,
+    pub(super) shown: ShownPoints,
+}
+
+impl<'a> LeftOut<'a> {
+    /// Creates the notes of a run, in a search that knows what is needed.
+    pub(super) fn new(needed: &'a NeededPoints) -> LeftOut<'a> {
+        LeftOut { needed, shown: ShownPoints::default() }
+    }
+
+    /// Takes from the machine which variables it has found to be in a race.
+    pub(super) fn take_variables(&mut self, vm: &mut Vm) {
+        for object in std::mem::take(&mut vm.scheduler.points.found_raced) {
+            // A variable without a name in a package counts as one that others cannot reach.
+            if let Some(symbol) = vm.names.name_of(&vm.heap, object) {
+                self.shown.variables.push(symbol);
+            }
+        }
+    }
+
+    /// Returns the objects of the variables that are known to be in a race.
+    pub(super) fn raced(&self, vm: &Vm) -> HashSet<u64> {
+        let objects = self.needed.variables.iter().filter_map(|symbol| vm.names.symbols.get(symbol));
+        objects.copied().map(Value::bits).collect()
+    }
+}
+
+/// Most searches that begin again with more points, before one leaves out nothing.
+const SEARCHES: u32 = 200;
+
+/// The searches of an exploration, one after the other until one has shown nothing.
+pub(super) struct Searches {
+    settings: Settings,
+    needed: NeededPoints,
+    count: u32,
+}
+
+impl Searches {
+    /// Creates the first search by these settings.
+    pub(super) fn new(settings: &Settings) -> Searches {
+        let settings = if settings.reduce { *settings } else { settings.with_all_points() };
+        Searches { settings, needed: NeededPoints::default(), count: 0 }
+    }
+
+    /// Returns the settings of the next search, and what it has to know.
+    pub(super) fn next(&self) -> (Settings, NeededPoints) {
+        (self.settings, self.needed.clone())
+    }
+
+    /// Takes in what the last search has shown.
+    pub(super) fn learn(&mut self, shown: ShownPoints) {
+        self.count += 1;
+        if shown.requests || self.count > SEARCHES {
+            self.settings = self.settings.with_all_points();
+        }
+        self.needed.places.extend(shown.places);
+        self.needed.variables.extend(shown.variables);
+    }
+}
