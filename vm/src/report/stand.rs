@@ -100,7 +100,9 @@ impl Vm {
     /// Ends the turns of all tasks, so that a call from now on runs alone. The run itself is over.
     pub fn stop_all_tasks(&mut self) {
         let scheduler = &mut self.scheduler;
-        scheduler.open_turn = None;
+        if let Some(slice) = scheduler.open_turn.take().and_then(|turn| turn.slice) {
+            scheduler.accounts.leave(slice.account);
+        }
         scheduler.queues = RunQueues::default();
         scheduler.timers = Timers::default();
         scheduler.readers.clear();

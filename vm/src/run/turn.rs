@@ -8,6 +8,7 @@ use super::limit::charge_account;
 use super::pending::deliver_pending;
 use super::signal::deliver_some;
 use super::wake::make_runnable;
+use crate::exchange::Charges;
 use crate::heap::Heap;
 use crate::interp::{self, Leave};
 use crate::observe::Seen;
@@ -39,6 +40,9 @@ fn run_slices(vm: &mut Vm, index: TaskIndex, end: u64) {
 pub(crate) fn go_on_with_turn(vm: &mut Vm, turn: OpenTurn, end: u64) {
     let index = turn.task.index;
     if !vm.scheduler.tasks.contains(turn.task) {
+        if let Some(slice) = turn.slice {
+            vm.scheduler.accounts.leave(slice.account);
+        }
         return;
     }
     if let Some(slice) = turn.slice {
@@ -98,7 +102,10 @@ fn run_slice(vm: &mut Vm, index: TaskIndex, end: u64) -> Option<Leave> {
 /// Gives a task the rest of a slice. `None` as by [`run_slice`].
 #[cold]
 fn run_rest_of_slice(vm: &mut Vm, index: TaskIndex, slice: OpenSlice, end: u64) -> Option<Leave> {
-    let Some(task) = vm.scheduler.tasks.take(index) else { return Some(Leave::Ended) };
+    let Some(task) = vm.scheduler.tasks.take(index) else {
+        vm.scheduler.accounts.leave(slice.account);
+        return Some(Leave::Ended);
+    };
     let portion = end.saturating_sub(vm.scheduler.spent);
     let allocated = vm.bytes_for_accounts();
     let leave = go_on_with_slice(vm, task, slice, portion);
@@ -155,6 +162,10 @@ impl Vm {
 fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>, portion: u64) -> (OpenSlice, Leave) {
     task.turns = task.turns.wrapping_add(1);
     let account = task.account;
+    // Until the slice is charged to it, its number is not that of another one.
+    vm.scheduler.accounts.enter(account);
+    // Notes from behind the slice before, such as that of the end of its account, do not concern this one.
+    vm.exchange.charges = Charges::default();
     let scheduler = &mut vm.scheduler;
     let turn = &mut scheduler.turn;
     scheduler.counts.switches += u64::from(index != turn.index);
@@ -230,6 +241,7 @@ fn end_slice(vm: &mut Vm, slice: OpenSlice, leave: Leave) {
     if account != AccountId::NONE {
         charge_account(vm, account, Measure::Ticks, used);
         charge_account(vm, account, Measure::Bytes, bytes);
+        vm.scheduler.accounts.leave(account);
     }
     if vm.watch.are_turns_noted {
         note_end_of_turn(vm, leave);
