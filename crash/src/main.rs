@@ -3,9 +3,9 @@
 //! It makes small durable programs, runs each without a kill, and then again while it kills the process
 //! again and again: at random moments, and, in a debug build of `eslvm`, before and behind each call by which
 //! the journal is written. A device in a third process counts the actions that it performs. At the end of
-//! each run it compares: no action was performed twice, no action that the program knows to be done is missing,
-//! each action with an unknown outcome was reported, and the last facts and lines are those of the run that
-//! was not killed.
+//! each run it compares: no action was performed twice, no action that the program knows to be done is
+//! missing, each action with an unknown outcome was reported, and the last facts and lines are those of the
+//! run that was not killed.
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "it is a command")]
 
@@ -41,6 +41,9 @@ struct CrashOptions {
     /// Let runs survive loss of power, which makes more places
     #[arg(long)]
     power: bool,
+    /// When snapshots are taken: after so much time or journal, or `never`
+    #[arg(long, default_value = "3ms")]
+    snapshot_every: String,
     /// Most seconds, after which the counts so far are reported
     #[arg(long, default_value_t = 3600)]
     seconds: u64,
@@ -86,7 +89,7 @@ fn run(options: &CrashOptions) -> std::io::Result<bool> {
     while counts.kills < options.kills && started.elapsed() < limit {
         let seed = chance.next();
         let text = generate(seed, device.port);
-        let subject = Subject::new(&options.eslvm, &text, options.power)?;
+        let subject = Subject::new(&options.eslvm, &text, options.power, &options.snapshot_every)?;
         let (alone, duration) = subject.run_alone(&device)?;
         counts.programs += 1;
         let mut place = 1;

@@ -60,16 +60,22 @@ pub(crate) struct Subject {
     eslvm: PathBuf,
     folder: PathBuf,
     is_power: bool,
+    snapshot_every: String,
 }
 
 impl Subject {
     /// Writes the program.
-    pub(crate) fn new(eslvm: &Path, text: &str, is_power: bool) -> std::io::Result<Subject> {
+    pub(crate) fn new(
+        eslvm: &Path,
+        text: &str,
+        is_power: bool,
+        snapshot_every: &str,
+    ) -> std::io::Result<Subject> {
         let folder = std::env::temp_dir().join(format!("esl-crash-{}", std::process::id()));
         drop(fs::remove_dir_all(&folder));
         fs::create_dir_all(&folder)?;
         fs::write(folder.join("program.esl"), text)?;
-        Ok(Subject { eslvm: eslvm.canonicalize()?, folder, is_power })
+        Ok(Subject { eslvm: eslvm.canonicalize()?, folder, is_power, snapshot_every: snapshot_every.into() })
     }
 
     /// Keeps the program and the files of its last run.
@@ -78,8 +84,13 @@ impl Subject {
             .folder
             .with_extension(format!("{:?}", Instant::now()).replace(|c: char| !c.is_ascii_digit(), ""));
         fs::create_dir_all(&kept)?;
-        for name in ["program.esl", "output", "errors", "state/journal.eslj"] {
-            drop(fs::copy(self.folder.join(name), kept.join(name.replace('/', "-"))));
+        for name in ["program.esl", "output", "errors"] {
+            drop(fs::copy(self.folder.join(name), kept.join(name)));
+        }
+        fs::create_dir_all(kept.join("state"))?;
+        for entry in fs::read_dir(self.folder.join("state"))? {
+            let entry = entry?;
+            drop(fs::copy(entry.path(), kept.join("state").join(entry.file_name())));
         }
         Ok(kept)
     }
@@ -105,6 +116,7 @@ impl Subject {
             "--state",
             "state",
         ]);
+        command.args(["--snapshot-every", &self.snapshot_every]);
         if self.is_power {
             command.args(["--durability", "power"]);
         }

@@ -7,6 +7,8 @@
 //!
 //! Source: Larson, "Dynamic hash tables", 1988, as in `esl_heap::table`.
 
+use esl_heap::stored;
+
 /// No entry.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -126,6 +128,9 @@ impl Buckets {
         }
     }
 }
+
+stored! { BucketLink { hash, next } }
+stored! { Buckets { heads, links, count } }
 
 #[cfg(test)]
 mod tests {

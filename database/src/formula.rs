@@ -9,6 +9,7 @@
 //! package, since programs use names such as `test` themselves. A variable is a symbol whose name begins with
 //! `?`; each `?` alone is a different variable.
 
+use esl_heap::{stored, stored_enum};
 use std::collections::{BTreeMap, BTreeSet};
 
 use esl_heap::Value;
@@ -479,3 +480,7 @@ impl<'a> FormulaParser<'a> {
         Ok(Formula::Test(TestForm { function, variables }))
     }
 }
+
+stored! { Pattern { rank, functor, arguments, tail, first_repeated } }
+stored! { TestForm { function, variables } }
+stored_enum! { Formula { Pattern(pattern) = 0, And(parts) = 1, Or(parts, first, last) = 2, Not(part) = 3, Test(form) = 4 } }

@@ -2,6 +2,7 @@
 
 use super::bucket::{Buckets, NONE, finish, mix};
 use super::term::Term;
+use esl_heap::stored;
 
 /// Predecessor of a row that is in no chain.
 pub(super) const UNLINKED: u32 = u32::MAX - 1;
@@ -148,3 +149,8 @@ impl Index {
         unlink(&mut self.links, &mut self.groups[group as usize].ends, row);
     }
 }
+
+stored! { ChainLink { before, after } }
+stored! { Ends { first, last } }
+stored! { Group { ends, count } }
+stored! { Index { mask, keys, groups, free_groups, links, distinct, position } }

@@ -40,9 +40,15 @@ mod tabling;
 mod term;
 mod tuple;
 
+stored! { EndedFact { relation, row, serial } }
+stored! { Database {
+    terms, relations, by_name, rules, time, facts, bytes, serial, ended, unlinked, released, retired, cells,
+} with { queries: BTreeMap::new(), room: QueryRoom::default() } }
+
 #[cfg(test)]
 mod tests;
 
+use esl_heap::stored;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 

@@ -15,6 +15,7 @@ use super::bucket::{Buckets, NONE};
 use super::effort::Effort;
 use super::index::{ChainLink, EMPTY, Ends, Index, hash_cells, push, unlink};
 use super::term::Term;
+use esl_heap::stored;
 
 /// Number of rows below which looking at all of them is best.
 const FEW: usize = 8;
@@ -376,3 +377,9 @@ impl Relation {
         by_index.reduce(f64::min).unwrap_or(guess)
     }
 }
+
+stored! { Lifespan { born, died } }
+stored! { WantedIndex { mask, vain } }
+stored! { Relation {
+    functor, width, is_property, cells, spans, links, ends, set, indexes, wanted, free, live, counted,
+} }

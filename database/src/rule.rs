@@ -4,6 +4,7 @@
 //! because a predicate depends on its own negation, the predicate has no stratum, and queries for it fail.
 //! Strata are found by the first query after a change of the rules.
 
+use esl_heap::stored;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -240,3 +241,7 @@ fn groups(uses: &[Vec<Use>]) -> Vec<Vec<usize>> {
     }
     found
 }
+
+stored! { Rule { head, body, names, source, held } }
+stored! { Predicate { functor, width, rules, stratum } }
+stored! { Rules { predicates, by_name, by_width, strata, is_stratified } }

@@ -1,6 +1,6 @@
 //! The control of a durable run by its embedder: pauses, and news of restarts.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_host::{Inbox, Pending, ReplayHost};
@@ -24,6 +24,9 @@ pub struct Resumed {
 /// Is called when a run is upgraded.
 type UpgradeListener = Box<dyn FnOnce(&UpgradeReport) + Send>;
 
+/// Is called with warnings about the run's files.
+type WarningListener = Box<dyn FnMut(&str) + Send>;
+
 /// Is called when a run goes on.
 type ResumeListener = Box<dyn FnOnce(&Resumed) + Send>;
 
@@ -40,6 +43,7 @@ struct ControlNotes {
     upgrading: Option<Pending>,
     upgraded: Option<UpgradeOutcome>,
     upgrade_listener: Option<UpgradeListener>,
+    warning_listener: Option<WarningListener>,
 }
 
 #[derive(Default)]
@@ -50,6 +54,14 @@ struct ControlState {
     is_ending: AtomicBool,
     /// Whether the run is a copy, which comes back at the end of its journal, or when an upgrade was tried.
     is_copy: AtomicBool,
+    /// Whether snapshots are taken, so that a pause waits for one.
+    has_snapshots: AtomicBool,
+    /// Whether the snapshot before a pause was taken, or is left out.
+    may_pause: AtomicBool,
+    /// Whether the run goes on with the outside, and the news of the restart have arrived.
+    is_settled: AtomicBool,
+    /// Number of questions whether a timer is due that were answered no.
+    not_due: AtomicU64,
     told: Mutex<ControlNotes>,
 }
 
@@ -94,6 +106,57 @@ impl DurableControl {
     /// Returns whether the run is a copy.
     pub(crate) fn is_copy(&self) -> bool {
         self.0.is_copy.load(Ordering::Relaxed)
+    }
+
+    /// Has pauses wait for a snapshot.
+    pub(crate) fn expect_snapshots(&self) {
+        self.0.has_snapshots.store(true, Ordering::Relaxed);
+    }
+
+    /// Lets the run pause.
+    pub(crate) fn allow_pause(&self) {
+        self.0.may_pause.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns whether the run may pause.
+    pub(crate) fn may_pause(&self) -> bool {
+        !self.0.has_snapshots.load(Ordering::Relaxed) || self.0.may_pause.load(Ordering::Relaxed)
+    }
+
+    /// Notes whether the run goes on with the outside, and how many questions whether a timer is due were
+    /// answered no.
+    pub(crate) fn note_standing(&self, is_settled: bool, not_due: u64) {
+        self.0.is_settled.store(is_settled, Ordering::Relaxed);
+        self.0.not_due.store(not_due, Ordering::Relaxed);
+    }
+
+    /// Returns whether the run goes on with the outside, and the news of the restart have arrived.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.0.is_settled.load(Ordering::Relaxed)
+    }
+
+    /// Returns how many questions whether a timer is due were answered no.
+    pub(crate) fn not_due(&self) -> u64 {
+        self.0.not_due.load(Ordering::Relaxed)
+    }
+
+    /// Sets a function that is called with warnings about the run's files.
+    pub fn on_warning(&self, listener: impl FnMut(&str) + Send + 'static) {
+        self.told().warning_listener = Some(Box::new(listener));
+    }
+
+    pub(crate) fn warn(&self, text: &str) {
+        if let Some(listener) = &mut self.told().warning_listener {
+            listener(text);
+        }
+    }
+
+    /// Begins the journal in the middle of the run, where so many questions whether a timer is due were
+    /// answered no, and the latest time was this.
+    pub(crate) fn start_past(&self, not_due: u64, time: u64) {
+        if let Some(past) = &self.told().past {
+            past.start(not_due, time);
+        }
     }
 
     /// Returns whether the machine is to come back now.

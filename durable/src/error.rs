@@ -35,6 +35,8 @@ pub enum DurableError {
     Diverged(String),
     /// The journal cannot be written, so no effect may leave.
     NotWritten(io::Error),
+    /// The snapshot of the run does not fit into this process: the reason, in words.
+    Snapshot(&'static str),
     /// The system has refused memory, which may have changed the course of the run.
     MemoryRefused,
 }
@@ -85,6 +87,9 @@ impl fmt::Display for DurableError {
                 "the journal cannot be written: {error}; the run stops before its next effect, and the same \
                  command goes on"
             ),
+            DurableError::Snapshot(reason) => {
+                write!(f, "the snapshot of the run cannot be loaded: {reason}; nothing has changed")
+            }
             DurableError::MemoryRefused => f.write_str(
                 "the system has refused memory, which may change the course of the run; the run stops, and the \
                  same command goes on",

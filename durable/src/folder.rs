@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 
 use super::DurableError;
 
-/// Name of the journal.
-const JOURNAL: &str = "journal.eslj";
 /// Name of the file that is locked.
 const LOCK: &str = "lock";
+
+/// Time in which a process that was killed lets go of the lock, its fork included.
+#[cfg(unix)]
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(2);
 
 /// The folder of a durable run, which this process has.
 #[derive(Debug)]
@@ -46,27 +48,38 @@ impl RunFolder {
         let lock =
             options.open(&lock_path).map_err(|error| DurableError::Folder(lock_path.clone(), error))?;
         #[cfg(unix)]
-        match rustix::fs::flock(&lock, rustix::fs::FlockOperation::NonBlockingLockExclusive) {
-            Ok(()) => {}
-            Err(rustix::io::Errno::WOULDBLOCK) => return Err(DurableError::InUse(path.into())),
-            Err(error) => return Err(DurableError::Folder(lock_path, error.into())),
-        }
-        let folder = RunFolder { path: path.into(), _lock: lock };
-        if folder.journal().exists() {
-            check_private(&folder.journal())?;
-        }
-        Ok(folder)
+        wait_for_lock(&lock, path)?;
+        Ok(RunFolder { path: path.into(), _lock: lock })
     }
 
-    /// Returns the file of the journal.
-    pub(crate) fn journal(&self) -> PathBuf {
-        self.path.join(JOURNAL)
+    /// Returns the path of the folder.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// Locks the folder. A fork of a process that was killed just now may have it for a moment still.
+#[cfg(unix)]
+fn wait_for_lock(lock: &File, path: &Path) -> Result<(), DurableError> {
+    use rustix::fs::{FlockOperation, flock};
+    use rustix::io::Errno;
+
+    let begun = std::time::Instant::now();
+    loop {
+        match flock(lock, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => return Ok(()),
+            Err(Errno::WOULDBLOCK) if begun.elapsed() < PATIENCE => {
+                std::thread::sleep(std::time::Duration::from_millis(5));
+            }
+            Err(Errno::WOULDBLOCK) => return Err(DurableError::InUse(path.into())),
+            Err(error) => return Err(DurableError::Folder(path.join(LOCK), error.into())),
+        }
     }
 }
 
 /// Refuses files of other users, and files that other users may read or write.
 #[cfg(unix)]
-fn check_private(path: &Path) -> Result<(), DurableError> {
+pub(crate) fn check_private(path: &Path) -> Result<(), DurableError> {
     use std::os::unix::fs::MetadataExt;
     let metadata = fs::metadata(path).map_err(|error| match error.kind() {
         std::io::ErrorKind::NotFound => DurableError::NoRun(path.into()),
@@ -77,6 +90,6 @@ fn check_private(path: &Path) -> Result<(), DurableError> {
 }
 
 #[cfg(not(unix))]
-fn check_private(path: &Path) -> Result<(), DurableError> {
+pub(crate) fn check_private(path: &Path) -> Result<(), DurableError> {
     fs::metadata(path).map(drop).map_err(|error| DurableError::Folder(path.into(), error))
 }

@@ -5,7 +5,11 @@ use std::collections::HashSet;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
-use esl_host::{ActionId, CallEffect, HostCall, HostError, HostFailure, Incoming, News, NotedRecord, Record};
+use esl_host::{
+    ActionId, CallEffect, HostCall, HostError, HostFailure, Incoming, News, NotedRecord, Record,
+    has_gone_object,
+};
+use esl_replay::OpenCall;
 
 /// Returns the failure of a call that the end of its process has interrupted.
 pub(crate) fn interrupted(call: HostCall<'_>, action: Option<ActionId>) -> HostFailure {
@@ -42,8 +46,8 @@ pub(crate) fn ended_operations(records: &[NotedRecord]) -> HashSet<u64> {
     ended.collect()
 }
 
-/// Returns the greatest number of a question in these records, 0 without one.
-pub(crate) fn last_question(records: &[NotedRecord]) -> u64 {
+/// Returns the greatest number of a question in these records and before them.
+pub(crate) fn last_question(records: &[NotedRecord], before: u64) -> u64 {
     let arrivals = records.iter().filter_map(|noted| match &noted.record {
         Record::Received((_, contents)) => Some(contents),
         _ => None,
@@ -52,16 +56,16 @@ pub(crate) fn last_question(records: &[NotedRecord]) -> u64 {
         Incoming::Question { number, .. } => Some(*number),
         _ => None,
     });
-    numbers.max().unwrap_or(0)
+    numbers.max().unwrap_or(0).max(before)
 }
 
-/// Returns how many senders of the inbox there are after these records.
-pub(crate) fn senders(records: &[NotedRecord]) -> usize {
+/// Returns how many senders of the inbox there are after these records, if there were `before`.
+pub(crate) fn senders(records: &[NotedRecord], before: usize) -> usize {
     let arrivals = records.iter().filter_map(|noted| match &noted.record {
         Record::Received((_, contents)) => Some(contents),
         _ => None,
     });
-    arrivals.flatten().fold(0, |count: usize, incoming| match incoming {
+    arrivals.flatten().fold(before, |count: usize, incoming| match incoming {
         Incoming::SenderCame => count + 1,
         Incoming::SenderLeft => count.saturating_sub(1),
         _ => count,
@@ -74,4 +78,25 @@ pub(crate) fn after_restart(call: HostCall<'_>, action: Option<ActionId>) -> New
         CallEffect::Closes => News::Completed(vec![Datum::nil(Span::default())]),
         _ => News::Failed(interrupted(call, action)),
     }
+}
+
+/// Returns a call that is under way.
+pub(crate) fn open_call(call: HostCall<'_>, number: u64, action: ActionId) -> OpenCall {
+    let HostCall { name, arguments, effect, operation: _ } = call;
+    OpenCall { number, name: name.into(), arguments: arguments.to_vec(), effect, action }
+}
+
+/// Returns the news of a call that the end of its process has interrupted; `None` if it is begun again.
+pub(crate) fn news_of(open: &OpenCall) -> Option<News> {
+    if is_repeated(open) {
+        return None;
+    }
+    let OpenCall { number, name, arguments, effect, action } = open;
+    let call = HostCall { name, arguments, effect: *effect, operation: Some(*number) };
+    Some(after_restart(call, Some(*action)))
+}
+
+/// Returns whether a call that the end of its process has interrupted is begun again.
+pub(crate) fn is_repeated(open: &OpenCall) -> bool {
+    open.effect.may_be_repeated() && !has_gone_object(&open.arguments)
 }

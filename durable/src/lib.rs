@@ -36,11 +36,13 @@ mod disk;
 mod error;
 mod file_effect;
 mod folder;
+mod generations;
 mod host;
 mod interruption;
 mod log;
 mod look;
 mod resume;
+mod snapshots;
 mod upgrade;
 
 use std::path::Path;
@@ -51,20 +53,25 @@ use esl_host::Host;
 use esl_replay::{
     Beginning, JournalLife, JournalUpgrade, JournalWriter, RecordedError, RunJournal, RunSetup,
 };
-use esl_vm::vm::Vm;
+use esl_vm::heap::range_start;
+use esl_vm::task::TaskId;
+use esl_vm::vm::{Config, Vm};
 
 pub use changes::ProgramChanges;
 pub use control::{DurableControl, Resumed};
-pub use disk::{Disk, RealDisk};
+pub use disk::{Disk, RealDisk, SnapshotWriting};
 pub use error::DurableError;
 pub use host::DurableHost;
 pub use log::LogFigures;
 pub use look::{DurableState, look};
+pub use snapshots::{SnapshotEvery, SnapshotFigures};
 pub use upgrade::UpgradeReport;
 
 use folder::RunFolder;
-use log::JournalLog;
+use generations::FoundJournals;
+use log::{JournalLog, Standing};
 use resume::{Resumption, chance, wall_clock};
+use snapshots::SnapshotTaker;
 use upgrade::Upgrade;
 
 /// The events that a durable run survives.
@@ -94,6 +101,8 @@ pub struct DurableOptions {
     pub durability: Durability,
     /// How the gap before it counts.
     pub downtime: Downtime,
+    /// When snapshots are taken.
+    pub snapshots: SnapshotEvery,
 }
 
 /// A durable run in this process.
@@ -101,6 +110,11 @@ pub struct DurableRun {
     folder: Option<RunFolder>,
     log: JournalLog,
     control: DurableControl,
+    taker: SnapshotTaker,
+    /// Start of the addresses of the machine's heap; `None` if it is never copied.
+    range: Option<usize>,
+    /// Warnings about the files.
+    warnings: Vec<String>,
     found: Option<FoundRun>,
 }
 
@@ -129,12 +143,10 @@ impl DurableRun {
     /// [`DurableError`].
     pub fn open(path: &Path, options: DurableOptions) -> Result<DurableRun, DurableError> {
         let folder = RunFolder::open(path)?;
-        let file = folder.journal();
-        let disk = with_kill(RealDisk::new(file.clone()));
-        let mut run = DurableRun::on(disk, options).map_err(|error| match error {
-            DurableError::NotWritten(error) => DurableError::Folder(file, error),
-            other => other,
-        })?;
+        let found = generations::find(folder.path())?;
+        let last = found.as_ref().map_or(0, |found| found.last);
+        let disk = with_kill(RealDisk::new(generations::journal_file(folder.path(), last)));
+        let mut run = DurableRun::with(disk, found, options)?;
         run.folder = Some(folder);
         Ok(run)
     }
@@ -157,24 +169,98 @@ impl DurableRun {
     /// [`DurableError`].
     pub fn on(mut disk: Box<dyn Disk>, options: DurableOptions) -> Result<DurableRun, DurableError> {
         let bytes = disk.read().map_err(DurableError::NotWritten)?;
-        let control = DurableControl::default();
-        let journal = match bytes.as_deref().map(RunJournal::read) {
-            None | Some(Err(RecordedError::NoBeginning)) => {
-                let log = JournalLog::new(disk, JournalWriter::default(), 0, options.durability);
-                return Ok(DurableRun { folder: None, log, control, found: None });
+        let found = match bytes.as_deref().map(RunJournal::read) {
+            None | Some(Err(RecordedError::NoBeginning)) => None,
+            Some(Ok(journal)) => {
+                let (warnings, snapshot_bytes) = (Vec::new(), 0);
+                Some(FoundJournals { journal, base: 0, last: 0, oldest: 0, snapshot_bytes, warnings })
             }
-            Some(journal) => journal.map_err(DurableError::Journal)?,
+            Some(Err(error)) => return Err(DurableError::Journal(error)),
         };
-        let RunJournal { recorded, lives, upgrades, length, time, writer } = journal;
+        DurableRun::with(disk, found, options)
+    }
+
+    /// Goes on with the journals that were found, or begins a run.
+    fn with(
+        disk: Box<dyn Disk>,
+        found: Option<FoundJournals>,
+        options: DurableOptions,
+    ) -> Result<DurableRun, DurableError> {
+        let control = DurableControl::default();
+        let fresh = (options.snapshots != SnapshotEvery::Never).then(|| range_start(chance()));
+        let Some(FoundJournals { journal, base, last: number, oldest, snapshot_bytes: _, warnings }) = found
+        else {
+            let standing = Standing::default();
+            let log = JournalLog::new(disk, JournalWriter::default(), 0, options.durability, standing);
+            let taker = SnapshotTaker::new(options.snapshots, log.clone(), control.clone());
+            let (folder, warnings) = (None, Vec::new());
+            return Ok(DurableRun { folder, log, control, taker, range: fresh, warnings, found: None });
+        };
+        let RunJournal { recorded, lives, upgrades, length, time, generation: _, writer } = journal;
         if !recorded.beginning.is_of_this_machine() {
             return Err(DurableError::Journal(RecordedError::OtherMachine));
         }
         let torn = (recorded.torn > 0).then_some(length as u64);
         let last = lives.last().copied().unwrap_or_default();
         let resumption = Resumption::new(&last, time, wall_clock(), options.downtime);
-        let log = JournalLog::new(disk, writer, length as u64, options.durability);
+        let standing = Standing { number, base, oldest, ..Standing::after(&recorded, &upgrades) };
+        let log = JournalLog::new(disk, writer, length as u64, options.durability, standing);
+        let taker = SnapshotTaker::new(options.snapshots, log.clone(), control.clone());
+        let snapshot = recorded.start.as_ref().and_then(|start| start.snapshot.as_ref());
+        let range = snapshot.map(|snapshot| snapshot.range).or(fresh);
         let found = FoundRun { recorded, upgrades, resumption, torn, upgrade: None };
-        Ok(DurableRun { folder: None, log, control, found: Some(found) })
+        Ok(DurableRun { folder: None, log, control, taker, range, warnings, found: Some(found) })
+    }
+
+    /// Returns warnings about the files, such as that of a damaged snapshot.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Returns the settings that the machine of the run needs, in place of these.
+    pub fn config(&self, config: Config) -> Config {
+        Config { range: self.range, ..config }
+    }
+
+    /// Makes the state of a machine that is ready for the program that of the snapshot from which the run
+    /// goes on. Returns the main task; `None` if there is no snapshot, so that the program begins in the
+    /// machine.
+    ///
+    /// # Errors
+    /// [`DurableError::Snapshot`].
+    pub fn restore(&self, machine: &mut Vm) -> Result<Option<TaskId>, DurableError> {
+        let Some(start) = self.found.as_ref().and_then(|found| found.recorded.start.as_deref()) else {
+            return Ok(None);
+        };
+        let snapshot = start.snapshot.as_ref().ok_or(DurableError::Snapshot("it is missing"))?;
+        if machine.heap_range() != Some(snapshot.range) {
+            return Err(DurableError::Snapshot(
+                "its addresses are taken in this process, which seldom happens; start it again",
+            ));
+        }
+        let main = if machine.load_state(&snapshot.state) { machine.main_task() } else { None };
+        let main =
+            main.ok_or(DurableError::Snapshot("it belongs to a machine that was made by other steps"))?;
+        let generation = &start.generation;
+        if let Some(found) = self.found.as_ref().filter(|_| !self.control.is_copy()) {
+            let ended = interruption::ended_operations(&found.recorded.records);
+            let open = generation.open.iter().filter(|call| !ended.contains(&call.number));
+            for call in open.filter(|call| interruption::is_repeated(call)) {
+                machine.begin_again(call.number, &call.name, &call.arguments, call.action);
+            }
+        }
+        self.control.start_past(generation.not_due, generation.time());
+        Ok(Some(main))
+    }
+
+    /// Has the machine take the snapshots of the run. To be called before it runs.
+    pub fn take_snapshots(&self, machine: &mut Vm) {
+        self.taker.install(machine);
+    }
+
+    /// Returns figures of the snapshots that this process has taken.
+    pub fn snapshot_figures(&self) -> SnapshotFigures {
+        self.taker.figures()
     }
 
     /// Returns the status with which the run has ended, if it has.
@@ -190,9 +276,12 @@ impl DurableRun {
     /// Returns the arguments that the program has asked for, if it has.
     pub fn arguments(&self) -> Option<&[String]> {
         let found = self.found.as_ref()?;
-        found.recorded.records.iter().find_map(|noted| match &noted.record {
-            esl_host::Record::Arguments(arguments) => Some(arguments.as_slice()),
-            _ => None,
+        let known = found.recorded.start.as_ref().and_then(|start| start.generation.arguments.as_deref());
+        known.or_else(|| {
+            found.recorded.records.iter().find_map(|noted| match &noted.record {
+                esl_host::Record::Arguments(arguments) => Some(arguments.as_slice()),
+                _ => None,
+            })
         })
     }
 
@@ -209,11 +298,13 @@ impl DurableRun {
     /// Returns the host of the run, whose outside is `host`.
     pub fn host<H: Host>(&self, host: H) -> DurableHost<H> {
         self.log.set_inbox(host.inbox());
+        let start = self.found.as_ref().and_then(|found| found.recorded.start.as_deref());
+        let start = start.map(|start| &start.generation);
         let (records, resumption, upgrade) = match &self.found {
             Some(found) => (found.recorded.records.clone(), Some(found.resumption), found.upgrade.clone()),
             None => (Vec::new().into(), None, None),
         };
-        DurableHost::new(host, self.log.clone(), self.control.clone(), records, resumption, upgrade)
+        DurableHost::new(host, self.log.clone(), self.control.clone(), records, start, resumption, upgrade)
     }
 
     /// Writes the program and the settings of a new run, or compares them with those with which the run has
@@ -263,6 +354,7 @@ impl DurableRun {
             let wall = wall_clock();
             self.log.note_life(JournalLife { is_pause: true, wall, time, ..life });
             self.log.finish();
+            self.taker.finish();
         }
         self.check()
     }

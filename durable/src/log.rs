@@ -4,15 +4,18 @@
 //! demands. After an error nothing is written any more, and every effect is refused: a system that has
 //! dropped data does not write them at a second try.
 
+use std::collections::{BTreeMap, HashSet};
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use esl_host::{ActionId, Inbox, NotedRecord, Record, Recorder, RunCheck};
+use esl_host::{ActionId, Inbox, Incoming, News, NotedRecord, Record, Recorder, RunCheck};
 use esl_replay::{
-    Beginning, JournalLife, JournalWriter, RecordedEnd, journal_beginning, journal_end, journal_life,
+    Beginning, JournalGeneration, JournalLife, JournalUpgrade, JournalWriter, OpenCall, Recorded,
+    RecordedEnd, journal_beginning, journal_end, journal_life,
 };
+use esl_vm::heap::HeapMemory;
 
-use super::disk::Disk;
+use super::disk::{Disk, SnapshotWriting};
 use super::{Durability, DurableError};
 
 /// Bytes of records that wait at most.
@@ -31,15 +34,79 @@ struct LogWriting {
     is_dear: bool,
     /// The process that writes; `None` before it has begun to.
     life: Option<JournalLife>,
+    standing: Standing,
     /// The program of an upgrade, bytes of an `.eslb` file, whose call is among the records that wait or come
     /// next.
     upgrade: Option<Vec<u8>>,
     /// Number of effects of this process.
     effects: u64,
+    /// Number of records of the run before this generation.
+    begun_at: u64,
     error: Option<DurableError>,
     /// Rung when there is an error, so that the machine comes back.
     inbox: Option<Inbox>,
     figures: LogFigures,
+}
+
+/// The beginning of the next generation of the journal.
+#[derive(Default)]
+pub(crate) struct Standing {
+    /// The beginning of the run, with its present program.
+    pub(crate) beginning: Option<Beginning>,
+    /// Number of the generation that is written, of that from which the run can go on, and of the oldest.
+    pub(crate) number: u64,
+    pub(crate) base: u64,
+    pub(crate) oldest: u64,
+    /// Number of records, of effects and of upgrades of the run so far.
+    pub(crate) records: u64,
+    pub(crate) effects: u64,
+    pub(crate) upgrades: u64,
+    pub(crate) senders: u64,
+    pub(crate) asked: u64,
+    pub(crate) arguments: Option<Vec<String>>,
+    /// The calls under way, and some that are over.
+    pub(crate) open: BTreeMap<u64, OpenCall>,
+}
+
+impl Standing {
+    /// Returns where a run stands after its journal.
+    pub(crate) fn after(recorded: &Recorded, upgrades: &[JournalUpgrade]) -> Standing {
+        let mut standing = Standing { beginning: Some(recorded.beginning.clone()), ..Standing::default() };
+        if let Some(start) = &recorded.start {
+            let generation = &start.generation;
+            standing.records = generation.records;
+            standing.effects = generation.effects;
+            standing.upgrades = generation.upgrades;
+            standing.senders = generation.senders;
+            standing.asked = generation.asked;
+            standing.arguments.clone_from(&generation.arguments);
+            standing.open = generation.open.iter().map(|call| (call.number, call.clone())).collect();
+        }
+        recorded.records.iter().for_each(|noted| standing.hear(&noted.record));
+        standing.upgrades += upgrades.len() as u64;
+        if let (Some(beginning), Some(upgrade)) = (&mut standing.beginning, upgrades.last()) {
+            beginning.program.clone_from(&upgrade.program);
+        }
+        standing
+    }
+
+    /// Takes the next record of the run into account.
+    fn hear(&mut self, record: &Record) {
+        self.records += 1;
+        match record {
+            Record::Intended(_) => self.effects += 1,
+            Record::Arguments(arguments) => self.arguments = Some(arguments.clone()),
+            Record::Received((_, contents)) => contents.iter().for_each(|incoming| match incoming {
+                Incoming::SenderCame => self.senders += 1,
+                Incoming::SenderLeft => self.senders = self.senders.saturating_sub(1),
+                Incoming::Question { number, .. } => self.asked = self.asked.max(*number),
+                Incoming::Operation { news: News::Progress(_), .. } => {}
+                Incoming::Operation { number, .. } => _ = self.open.remove(number),
+                _ => {}
+            }),
+            _ => {}
+        }
+    }
 }
 
 /// Figures of a journal that is being written.
@@ -66,6 +133,7 @@ impl JournalLog {
         writer: JournalWriter,
         length: u64,
         durability: Durability,
+        standing: Standing,
     ) -> JournalLog {
         JournalLog(Arc::new(Mutex::new(LogWriting {
             disk,
@@ -75,8 +143,10 @@ impl JournalLog {
             synced: length,
             is_dear: false,
             life: None,
+            standing,
             upgrade: None,
             effects: 0,
+            begun_at: 0,
             error: None,
             inbox: None,
             figures: LogFigures::default(),
@@ -103,6 +173,93 @@ impl JournalLog {
         writing.hear(created);
         (writing.written, writing.synced) = (bytes.len() as u64, bytes.len() as u64);
         writing.life = Some(life);
+        writing.standing.beginning = Some(beginning.clone());
+    }
+
+    /// Notes that a call is under way.
+    pub(crate) fn note_open(&self, call: OpenCall) {
+        self.lock().standing.open.insert(call.number, call);
+    }
+
+    /// Forgets the calls under way that have ended.
+    pub(crate) fn forget_ended(&self, ended: &HashSet<u64>) {
+        self.lock().standing.open.retain(|number, _| !ended.contains(number));
+    }
+
+    /// Returns the bytes of the journal of this generation, with the records that wait.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.lock().written
+    }
+
+    /// Returns whether this generation has records of the run.
+    pub(crate) fn has_records(&self) -> bool {
+        let writing = self.lock();
+        writing.standing.records > writing.begun_at
+    }
+
+    /// Begins the journal of the next generation at this place. The calls with these numbers are under way.
+    /// Returns its number. After an error the run goes on in the same journal.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub(crate) fn begin_generation(&self, open: &[u64], not_due: u64) -> io::Result<u64> {
+        let mut writing = self.lock();
+        writing.write();
+        writing.sync();
+        let LogWriting { standing, writer, life, error, .. } = &mut *writing;
+        let (Some(beginning), Some(life), None) = (&standing.beginning, *life, error) else {
+            return Err(io::Error::other("the journal before it cannot be written"));
+        };
+        standing.open.retain(|number, _| open.contains(number));
+        let mut generation = JournalGeneration::default();
+        generation.number = standing.number + 1;
+        generation.life = life;
+        generation.records = standing.records;
+        generation.effects = standing.effects;
+        generation.upgrades = standing.upgrades;
+        generation.senders = standing.senders;
+        generation.asked = standing.asked;
+        generation.not_due = not_due;
+        generation.arguments.clone_from(&standing.arguments);
+        generation.open = standing.open.values().cloned().collect();
+        let (number, records) = (generation.number, generation.records);
+        let contents = writer.begin_generation(beginning, generation);
+        if let Err(error) = writing.disk.begin_generation(number, &contents) {
+            // The next process must not find a part of it.
+            if let Err(error) = writing.disk.remove_generation(number)
+                && error.kind() != io::ErrorKind::Unsupported
+            {
+                writing.fail(DurableError::NotWritten(error));
+            }
+            return Err(error);
+        }
+        writing.standing.number = number;
+        writing.begun_at = records;
+        (writing.written, writing.synced) = (contents.len() as u64, contents.len() as u64);
+        Ok(number)
+    }
+
+    /// Begins to write a snapshot.
+    ///
+    /// # Errors
+    /// If that cannot be begun.
+    pub(crate) fn write_snapshot(
+        &self,
+        number: u64,
+        head: Vec<u8>,
+        memory: &HeapMemory<'_>,
+    ) -> io::Result<SnapshotWriting> {
+        let mut writing = self.lock();
+        let obsolete = writing.standing.oldest..writing.standing.base;
+        writing.disk.write_snapshot(number, head, memory, obsolete)
+    }
+
+    /// Lets the run go on from a snapshot that was written, which has made all obsolete but the last two
+    /// generations from which it can go on.
+    pub(crate) fn keep_snapshot(&self, number: u64) {
+        let standing = &mut self.lock().standing;
+        standing.oldest = standing.oldest.max(standing.base);
+        standing.base = number;
     }
 
     /// Notes that this process goes on with the run, or pauses it.
@@ -135,6 +292,10 @@ impl JournalLog {
     pub(crate) fn begin_upgrade(&self, program: Vec<u8>) {
         let mut writing = self.lock();
         writing.write();
+        writing.standing.upgrades += 1;
+        if let Some(beginning) = &mut writing.standing.beginning {
+            beginning.program.clone_from(&program);
+        }
         writing.upgrade = Some(program);
     }
 
@@ -293,6 +454,7 @@ impl Recorder for JournalLog {
         let mut writing = self.lock();
         if writing.error.is_none() {
             writing.is_dear |= is_dear(&noted.record);
+            writing.standing.hear(&noted.record);
             if writing.writer.add(&noted) > BUFFER {
                 writing.write();
             }

@@ -8,8 +8,8 @@ use esl_host::{Record, Survey, SurveyRequest};
 use esl_replay::{JournalLife, Recorded, Replayed, Rerun, RunJournal};
 use esl_vm::vm::Vm;
 
-use super::disk::{Disk, RealDisk};
 use super::folder::RunFolder;
+use super::generations::{self, FoundJournals};
 use super::resume::{Resumption, wall_clock};
 use super::{Downtime, DurableError, DurableRun};
 
@@ -27,8 +27,18 @@ pub struct DurableState {
     pub records: usize,
     /// Effects of which the journal has the intents.
     pub effects: usize,
-    /// Bytes of the journal.
+    /// Bytes of the journals by which it goes on.
     pub bytes: usize,
+    /// Number of the generation of its journal.
+    pub generation: u64,
+    /// Number of the generation from which it goes on: that of the snapshot, or 0 for its beginning.
+    pub base: u64,
+    /// Number of the oldest generation that is kept.
+    pub oldest: u64,
+    /// Bytes of the snapshot; 0 without one.
+    pub snapshot_bytes: u64,
+    /// Why newer snapshots are left out.
+    pub warnings: Vec<String>,
     /// Bytes of a torn tail.
     pub torn: usize,
     /// Exit status, if it has ended.
@@ -87,12 +97,15 @@ pub fn look(path: &Path) -> Result<DurableState, DurableError> {
         return Err(DurableError::NoRun(path.into()));
     }
     let folder = RunFolder::take(path)?;
-    let file = folder.journal();
-    let bytes = RealDisk::new(file.clone()).read();
-    let bytes = bytes.map_err(|error| DurableError::Folder(file.clone(), error))?;
-    let bytes = bytes.ok_or_else(|| DurableError::NoRun(path.into()))?;
-    let RunJournal { recorded, lives, upgrades, length, time, .. } =
-        RunJournal::read(&bytes).map_err(DurableError::Journal)?;
+    let found = generations::find(folder.path())?.ok_or_else(|| DurableError::NoRun(path.into()))?;
+    let FoundJournals { journal, base, last, oldest, snapshot_bytes, warnings } = found;
+    let file = generations::journal_file(folder.path(), last);
+    let bytes = (base..=last)
+        .map(|number| {
+            fs::metadata(generations::journal_file(folder.path(), number)).map_or(0, |file| file.len())
+        })
+        .sum::<u64>();
+    let RunJournal { recorded, lives, upgrades, time, .. } = journal;
     let mut machine = match recorded.end {
         Some(_) => LookedMachine::Ended(Box::new(run_ended(&recorded)?)),
         None => {
@@ -102,16 +115,25 @@ pub fn look(path: &Path) -> Result<DurableState, DurableError> {
             LookedMachine::Open(Box::new(copy.run_to_end_of_journal()?))
         }
     };
+    let before = recorded
+        .start
+        .as_ref()
+        .map_or((0, 0), |start| (start.generation.records as usize, start.generation.effects as usize));
     let is_intent = |record: &Record| matches!(record, Record::Intended(_));
     let written = fs::metadata(&file).and_then(|metadata| metadata.modified()).ok();
     Ok(DurableState {
         program_file: recorded.beginning.program_file.clone(),
         identity: recorded.beginning.identity().into(),
-        records: recorded.records.len(),
-        effects: recorded.records.iter().filter(|noted| is_intent(&noted.record)).count(),
+        records: before.0 + recorded.records.len(),
+        effects: before.1 + recorded.records.iter().filter(|noted| is_intent(&noted.record)).count(),
         lives,
         upgrades: upgrades.iter().map(|upgrade| upgrade.life).collect(),
-        bytes: length,
+        bytes: bytes as usize - recorded.torn,
+        generation: last,
+        base,
+        oldest,
+        snapshot_bytes,
+        warnings,
         torn: recorded.torn,
         ended: recorded.end.map(|end| end.status),
         written,

@@ -17,15 +17,16 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_compiler::diagnostic::Sources;
 use esl_host::{Answer, FunctionRef, Host, Inbox, Incoming, Pending, Question, Sender, VirtualHost};
-use esl_replay::{JournalWriter, Recorded, RecordedError, begin_recorded};
+use esl_replay::{JournalWriter, Recorded, RecordedError, begin_recorded, prepare_recorded};
 use esl_vm::run::RunOutcome;
 use esl_vm::vm::Vm;
 
 use super::changes::{ProgramChanges, changes};
 use super::control::DurableControl;
 use super::disk::NowhereDisk;
-use super::log::JournalLog;
+use super::log::{JournalLog, Standing};
 use super::resume::Resumption;
+use super::snapshots::{SnapshotEvery, SnapshotTaker};
 use super::{Durability, DurableError, DurableRun, FoundRun};
 
 /// Ticks between two looks of a trial.
@@ -252,12 +253,16 @@ impl DurableRun {
         resumption: Resumption,
         upgrade: Option<Upgrade>,
     ) -> DurableRun {
-        let log = JournalLog::new(Box::new(NowhereDisk), JournalWriter::default(), 0, Durability::Process);
+        let writer = JournalWriter::default();
+        let log = JournalLog::new(Box::new(NowhereDisk), writer, 0, Durability::Process, Standing::default());
         let recorded = recorded.clone();
+        let snapshot = recorded.start.as_ref().and_then(|start| start.snapshot.as_ref());
+        let range = snapshot.map(|snapshot| snapshot.range);
         let found = FoundRun { recorded, upgrades: Vec::new(), resumption, torn: None, upgrade };
         let control = DurableControl::default();
         control.set_copy();
-        DurableRun { folder: None, log, control, found: Some(found) }
+        let taker = SnapshotTaker::new(SnapshotEvery::Never, log.clone(), control.clone());
+        DurableRun { folder: None, log, control, taker, range, warnings: Vec::new(), found: Some(found) }
     }
 
     /// Runs a copy to the end of its journal. Returns its machine there.
@@ -287,8 +292,16 @@ impl DurableRun {
         outside.advance(self.elapsed());
         let host = self.host(outside);
         let first = read_program(&found.recorded.beginning.program)?;
-        let begun = begin_recorded(&found.recorded.beginning, &first, Box::new(host));
-        begun.map(|(machine, _)| machine).map_err(|error| DurableError::Diverged(error.to_string()))
+        let beginning = &found.recorded.beginning;
+        let diverged = |error: esl::Error| DurableError::Diverged(error.to_string());
+        if found.recorded.start.is_none() {
+            return begin_recorded(beginning, &first, Box::new(host))
+                .map(|(machine, _)| machine)
+                .map_err(diverged);
+        }
+        let mut machine = prepare_recorded(beginning, self.range, Box::new(host)).map_err(diverged)?;
+        self.restore(&mut machine)?;
+        Ok(machine)
     }
 }
 

@@ -7,7 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use esl::program::{self, Program, Source, compile};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
-use esl_durable::{Disk, Downtime, Durability, DurableError, DurableOptions, DurableRun, RealDisk};
+use esl_durable::{
+    Disk, Downtime, Durability, DurableError, DurableOptions, DurableRun, RealDisk, SnapshotEvery,
+};
 use esl_host::{CallEffect, HostFunction, HostOperation, RealHost, Rights};
 use esl_replay::{RunJournal, RunSetup};
 use esl_vm::vm::{Config, Vm};
@@ -229,7 +231,8 @@ fn life(
     durability: Durability,
     device: &Device,
 ) -> Result<(u8, String), DurableError> {
-    let options = DurableOptions { durability, downtime: Downtime::Stops };
+    let snapshots = SnapshotEvery::Never;
+    let options = DurableOptions { durability, downtime: Downtime::Stops, snapshots };
     let run = DurableRun::on(Box::new(disk), options)?;
     if let Some(status) = run.ended() {
         return Ok((status, String::new()));

@@ -11,6 +11,8 @@
 //! | [`equality`] | `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them |
 //! | [`table`] | hash tables that keep the order of insertion |
 //! | [`state`] | the list of all state, and the macro that makes it |
+//! | [`store`] | the state of a machine as bytes |
+//! | [`fork`] | a fork of the process that writes memory to a file |
 //! | [`allocator`] | a setting of the C library's allocator, for commands |
 //! | [`character`] | case, classes and names of characters |
 //!
@@ -24,11 +26,13 @@ pub mod allocator;
 pub mod array;
 pub mod character;
 pub mod equality;
+pub mod fork;
 pub mod heap;
 pub mod number;
 pub mod saved_pc;
 pub mod stack;
 pub mod state;
+pub mod store;
 pub mod table;
 pub mod value;
 

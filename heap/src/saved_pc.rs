@@ -12,6 +12,16 @@ pub struct SavedPc(*const u32);
 // that does so shows that the code belongs to the machine in hand.
 unsafe impl Send for SavedPc {}
 
+impl crate::store::Stored for SavedPc {
+    fn store(&self, out: &mut Vec<u8>) {
+        self.0.addr().store(out);
+    }
+
+    fn load(from: &mut crate::store::StoredBytes<'_>) -> Option<SavedPc> {
+        usize::load(from).map(|pc| SavedPc(std::ptr::with_exposed_provenance(pc)))
+    }
+}
+
 impl SavedPc {
     /// No address.
     pub const NONE: SavedPc = SavedPc(std::ptr::null());

@@ -21,6 +21,7 @@ use std::alloc::{Layout, alloc, dealloc, handle_alloc_error, realloc};
 use std::ptr::NonNull;
 
 use crate::list_state;
+use crate::store::{Stored, StoredBytes};
 use crate::value::Value;
 
 /// Register stack of a task.
@@ -143,6 +144,36 @@ impl Stack {
         debug_assert!(top <= self.capacity());
         // SAFETY: invariant 1: every word below the capacity is a value; the slice borrows the stack.
         unsafe { std::slice::from_raw_parts(self.start.as_ptr(), top.min(self.capacity())) }
+    }
+}
+
+impl Stored for Stack {
+    fn store(&self, out: &mut Vec<u8>) {
+        self.capacity.store(out);
+        self.scan.store(out);
+        // The unused words at the end are `nil` most often.
+        let words = self.words(self.capacity());
+        let used = words.iter().rposition(|&word| word != Value::NIL).map_or(0, |last| last + 1);
+        used.store(out);
+        words[..used].iter().for_each(|word| word.store(out));
+    }
+
+    fn load(from: &mut StoredBytes<'_>) -> Option<Stack> {
+        let (capacity, scan, used) = (u32::load(from)?, u32::load(from)?, usize::load(from)?);
+        let words = capacity as usize;
+        if used > words || words >= 1 << 31 {
+            return None;
+        }
+        if words == 0 {
+            return Some(Stack { scan, ..Stack::none() });
+        }
+        let stack = Stack { start: allocate(words), capacity, scan };
+        for index in 0..used {
+            let word = Value::load(from)?;
+            // SAFETY: the segment has more than `used` words, or as many.
+            unsafe { stack.start.add(index).write(word) };
+        }
+        Some(stack)
     }
 }
 

@@ -56,6 +56,11 @@ impl Asked {
         self.host.restore(state)
     }
 
+    /// Goes on with a canary.
+    pub fn set_canary(&mut self, canary: Canary) {
+        self.canary = canary;
+    }
+
     /// Returns the canary of the questions so far.
     #[inline]
     pub fn canary(&self) -> Canary {

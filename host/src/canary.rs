@@ -9,6 +9,7 @@ use esl_heap::list_state;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Canary(u64);
 
+esl_heap::stored! { Canary { 0 } }
 list_state! { Canary { 0: Run } }
 
 impl Canary {

@@ -53,6 +53,8 @@ pub enum Taken<T> {
     Failed(HostError),
 }
 
+esl_heap::stored! { Console { output, errors, columns, noted, broken, failure, input, partial, at_end } }
+
 list_state! { Console {
     output: Run,
     errors: Run,

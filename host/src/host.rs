@@ -329,3 +329,5 @@ pub trait Host {
         let _ = check;
     }
 }
+
+esl_heap::stored_enum! { HostError { BrokenPipe = 0, NotFound = 1, Refused = 2, Exists = 3, Other(text) = 4 } }

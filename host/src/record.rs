@@ -275,6 +275,11 @@ impl<H: Host, R: Recorder> RecordingHost<H, R> {
         self.not_due = not_due;
     }
 
+    /// Returns how many questions whether a timer is due were answered no.
+    pub fn not_due(&self) -> u64 {
+        self.not_due
+    }
+
     /// Returns the host, for questions that are not recorded.
     pub fn host_mut(&mut self) -> &mut H {
         &mut self.host

@@ -7,6 +7,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 use esl_heap::state::{StateSink, Stated};
+use esl_heap::store::{Stored, StoredBytes};
 
 /// A value, copied when it is changed while there is another copy.
 #[derive(Debug, Default)]
@@ -45,6 +46,16 @@ impl<T: Clone> DerefMut for CopyOnWrite<T> {
 impl<T: Stated> Stated for CopyOnWrite<T> {
     fn tell(&self, sink: &mut dyn StateSink) {
         self.0.tell(sink);
+    }
+}
+
+impl<T: Stored> Stored for CopyOnWrite<T> {
+    fn store(&self, out: &mut Vec<u8>) {
+        (**self).store(out);
+    }
+
+    fn load(from: &mut StoredBytes<'_>) -> Option<CopyOnWrite<T>> {
+        T::load(from).map(CopyOnWrite::new)
     }
 }
 

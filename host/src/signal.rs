@@ -68,6 +68,10 @@ impl ProcessSignal {
     }
 }
 
+esl_heap::stored_enum! { ProcessSignal {
+    HangUp = 0, Interrupt = 1, User1 = 2, User2 = 3, Terminate = 4, Window = 5, Other(number) = 6,
+} }
+
 #[cfg(test)]
 mod tests {
     use super::*;

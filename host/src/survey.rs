@@ -4,6 +4,7 @@
 //! also while the machine sleeps in its host. It belongs to no round, is in no recording and wakes no task,
 //! so a run that is looked at is the run that it would have been. Everything here is plain data.
 
+use esl_heap::store::{Stored, StoredBytes};
 use std::fmt;
 
 use esl_bytecode::compile::SourcePlace;
@@ -328,6 +329,24 @@ impl Inbox {
         let mut inspections = self.inspections();
         inspections.is_closed = true;
         inspections.list.clear();
+    }
+}
+
+impl Stored for FailureFrame {
+    fn store(&self, out: &mut Vec<u8>) {
+        let FailureFrame { task, function, place, is_of_library, has_left } = self;
+        (task.clone(), function.clone()).store(out);
+        let place = place.as_ref().map(|place| (place.source.clone(), place.line, place.column));
+        place.store(out);
+        (*is_of_library, *has_left).store(out);
+    }
+
+    fn load(from: &mut StoredBytes<'_>) -> Option<FailureFrame> {
+        let (task, function) = Stored::load(from)?;
+        let place: Option<(String, u32, u32)> = Stored::load(from)?;
+        let place = place.map(|(source, line, column)| SourcePlace { source, line, column });
+        let (is_of_library, has_left) = Stored::load(from)?;
+        Some(FailureFrame { task, function, place, is_of_library, has_left })
     }
 }
 

@@ -26,14 +26,17 @@
 //! number; lz4 gives at most 255 bytes for one.
 
 use std::fmt;
+use std::sync::Arc;
 
 use esl::program::ExecutionIdentity;
 use esl_host::{NotedRecord, Right, RunCheck};
 use esl_vm::embed::Need;
 use esl_vm::vm::Config;
 
+use super::generation::JournalGeneration;
 use super::journal::RunJournal;
 use super::pack::{ByteReader, ByteWriter};
+use super::snapshot::RunSnapshot;
 
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
@@ -57,6 +60,7 @@ pub(super) mod kind {
     pub(crate) const MARKED: u8 = 6;
     pub(crate) const MARKED_COMPRESSED: u8 = 7;
     pub(crate) const UPGRADE: u8 = 8;
+    pub(crate) const GENERATION: u8 = 9;
 }
 
 /// A function of the embedder's, as a replay has to know it.
@@ -120,11 +124,22 @@ pub struct Recorded {
     /// The beginning of the run.
     pub beginning: Beginning,
     /// The records.
-    pub records: std::sync::Arc<[NotedRecord]>,
+    pub records: Arc<[NotedRecord]>,
     /// How it has ended; `None` if the file ends before.
     pub end: Option<RecordedEnd>,
     /// Bytes of a torn frame that were left out.
     pub torn: usize,
+    /// Where the records begin; `None` for the beginning of the run.
+    pub start: Option<Arc<RunStart>>,
+}
+
+/// A place in the course of a run at which its records begin.
+#[derive(Clone, Debug)]
+pub struct RunStart {
+    /// The frame in the journal.
+    pub generation: JournalGeneration,
+    /// The state of the machine, once it was read from its file.
+    pub snapshot: Option<RunSnapshot>,
 }
 
 /// Why bytes are not a recorded run.
@@ -146,6 +161,8 @@ pub enum RecordedError {
     },
     /// It was made by another build of the machine or its library.
     OtherMachine,
+    /// It begins at a snapshot, which is not beside it.
+    NoSnapshot,
 }
 
 impl fmt::Display for RecordedError {
@@ -161,6 +178,9 @@ impl fmt::Display for RecordedError {
             RecordedError::Damaged { offset, problem } => {
                 write!(f, "it is damaged at byte {offset}: {problem}")
             }
+            RecordedError::NoSnapshot => f.write_str(
+                "it begins in the middle of its run, at a snapshot that is not beside it or cannot be read",
+            ),
             RecordedError::OtherMachine => f.write_str(
                 "it was made by another version of the machine or its library, in which the same run takes \
                  another course; replay it with that version",
@@ -260,6 +280,7 @@ fn write_config(out: &mut ByteWriter, config: &Config) {
         cleanup_ticks,
         cleanup_time,
         snapshots: _,
+        range: _,
     } = config;
     let optional = |out: &mut ByteWriter, number: Option<u64>| {
         out.byte(number.is_some().into());
@@ -295,6 +316,7 @@ fn read_config(from: &mut ByteReader<'_>) -> Option<Config> {
         cleanup_ticks: from.number()?,
         cleanup_time: from.number()?,
         snapshots: false,
+        range: None,
     })
 }
 

@@ -1,12 +1,13 @@
 //! The journal of a durable run: a recording that several processes write, one after the other.
 //!
-//! It is a file as `file` describes it, with frames of four further kinds:
+//! It is a file as `file` describes it, with frames of five further kinds:
 //!
 //! ```text
 //! 5 life                 a process begins to write, or pauses the run: mark, and the fields of `JournalLife`
 //! 6 marked records       mark, and the records
 //! 7 the same, compressed by lz4: mark, length of the records, compressed records
 //! 8 upgrade              mark, the program that the run has from here on, and records
+//! 9 generation           mark, and where the journal begins, if not with its run (`generation`)
 //! ```
 //!
 //! The records of an upgrade have the call that makes the definitions of its program. Both are in one frame,
@@ -20,12 +21,15 @@
 //! if one of its sectors is zero, and no whole frame behind it has a mark beyond it; a torn tail is cut. Any
 //! other bad frame means that the file was changed, and it is refused.
 
+use std::sync::Arc;
+
 use esl_host::NotedRecord;
 
 use super::file::{
-    Beginning, COMPRESSED_ABOVE, FORMAT, FRAME, MAGIC, Recorded, RecordedEnd, RecordedError, beginning_bytes,
-    decompress, end_bytes, frame, is_own, kind, read_beginning, read_end,
+    Beginning, COMPRESSED_ABOVE, FORMAT, FRAME, MAGIC, Recorded, RecordedEnd, RecordedError, RunStart,
+    beginning_bytes, decompress, end_bytes, frame, is_own, kind, read_beginning, read_end,
 };
+use super::generation::JournalGeneration;
 use super::pack::{ByteReader, ByteWriter};
 use super::records::{self, Before};
 
@@ -82,6 +86,16 @@ impl JournalWriter {
         bytes
     }
 
+    /// Returns the first bytes of a journal that goes on here, with this beginning. No record waits. The
+    /// generation gets the base of the differences that the next records state.
+    pub fn begin_generation(&self, beginning: &Beginning, generation: JournalGeneration) -> Vec<u8> {
+        debug_assert!(self.is_empty(), "the records before belong to the journal before");
+        let mut bytes = beginning_bytes(beginning);
+        let mark = bytes.len() as u64;
+        bytes.extend(JournalGeneration { before: self.before, ..generation }.to_frame(mark));
+        bytes
+    }
+
     /// Takes the records that wait as a frame of a recording that one process writes.
     pub(super) fn take_unmarked(&mut self) -> Vec<u8> {
         self.take_as(None)
@@ -123,11 +137,7 @@ pub fn journal_beginning(beginning: &Beginning) -> Vec<u8> {
 pub fn journal_life(life: &JournalLife, mark: u64) -> Vec<u8> {
     let mut out = ByteWriter::default();
     out.number(mark);
-    out.number(life.number);
-    out.byte(life.is_pause.into());
-    out.signed(life.wall);
-    out.number(life.time);
-    out.0.extend_from_slice(&life.chance.to_le_bytes());
+    write_life_fields(&mut out, life);
     let mut bytes = Vec::new();
     frame(&mut bytes, kind::LIFE, &out.0);
     bytes
@@ -138,15 +148,26 @@ pub fn journal_end(end: &RecordedEnd) -> Vec<u8> {
     end_bytes(end)
 }
 
-fn read_life(from: &mut ByteReader<'_>) -> Option<JournalLife> {
-    let life = JournalLife {
+pub(super) fn write_life_fields(out: &mut ByteWriter, life: &JournalLife) {
+    out.number(life.number);
+    out.byte(life.is_pause.into());
+    out.signed(life.wall);
+    out.number(life.time);
+    out.0.extend_from_slice(&life.chance.to_le_bytes());
+}
+
+pub(super) fn read_life_fields(from: &mut ByteReader<'_>) -> Option<JournalLife> {
+    Some(JournalLife {
         number: from.number()?,
         is_pause: from.flag()?,
         wall: from.signed()?,
         time: from.number()?,
         chance: u64::from_le_bytes(from.array()?),
-    };
-    from.is_empty().then_some(life)
+    })
+}
+
+fn read_life(from: &mut ByteReader<'_>) -> Option<JournalLife> {
+    read_life_fields(from).filter(|_| from.is_empty())
 }
 
 /// The contents at some place of a file.
@@ -219,7 +240,7 @@ fn is_torn(bytes: &[u8], offset: usize) -> bool {
 fn has_frame_beyond(bytes: &[u8], offset: usize) -> bool {
     (offset + 1..bytes.len()).any(|at| {
         whole_frame(&bytes[at..]).is_some_and(|(kind, content)| match kind {
-            kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED | kind::UPGRADE => {
+            kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED | kind::UPGRADE | kind::GENERATION => {
                 ByteReader(content).number().is_some_and(|mark| mark > offset as u64)
             }
             _ => true,
@@ -251,6 +272,8 @@ pub struct RunJournal {
     pub length: usize,
     /// Time of the program's clock at the last record that has one.
     pub time: u64,
+    /// Number of the generation that ends it.
+    pub generation: u64,
     /// Writes the records that follow.
     pub writer: JournalWriter,
 }
@@ -290,17 +313,48 @@ impl RunJournal {
                 FoundFrame::Wrong(problem) => return Err(RecordedError::Damaged { offset, problem }),
             }
         }
-        let JournalReading { beginning, records, lives, upgrades, end, before, .. } = reading;
+        let JournalReading { beginning, records, lives, upgrades, end, before, generation, .. } = reading;
+        let number = generation.as_ref().map_or(0, |generation| generation.number);
+        let start = generation.map(|generation| Arc::new(RunStart { generation, snapshot: None }));
         let beginning = beginning.ok_or(RecordedError::NoBeginning)?;
         let torn = bytes.len() - offset;
         Ok(RunJournal {
-            recorded: Recorded { beginning, records: records.into(), end, torn },
+            recorded: Recorded { beginning, records: records.into(), end, torn, start },
             lives,
             upgrades,
             length: offset,
             time: before.time(),
+            generation: number,
             writer: JournalWriter { packed: ByteWriter::default(), before },
         })
+    }
+}
+
+impl RunJournal {
+    /// Goes on with the journal of the next generation, whose beginning is the end of this one. Returns
+    /// whether it is; if not, nothing changes.
+    #[must_use]
+    pub fn append(&mut self, next: RunJournal) -> bool {
+        let Some(start) = next.recorded.start.as_deref() else { return false };
+        let is_next = start.generation.number == self.generation + 1
+            && start.generation.before == self.writer.before
+            && self.recorded.end.is_none()
+            && self.recorded.torn == 0;
+        if !is_next {
+            return false;
+        }
+        let offset = self.recorded.records.len();
+        let records = self.recorded.records.iter().chain(next.recorded.records.iter());
+        self.recorded.records = records.cloned().collect();
+        (self.recorded.end, self.recorded.torn) = (next.recorded.end, next.recorded.torn);
+        // The first one repeats the last one of this journal.
+        self.lives.extend(next.lives.into_iter().skip(1));
+        let upgrades = next.upgrades.into_iter();
+        self.upgrades
+            .extend(upgrades.map(|upgrade| JournalUpgrade { records: upgrade.records + offset, ..upgrade }));
+        (self.length, self.time, self.writer) = (next.length, next.time, next.writer);
+        self.generation = next.generation;
+        true
     }
 }
 
@@ -312,6 +366,7 @@ struct JournalReading {
     upgrades: Vec<JournalUpgrade>,
     end: Option<RecordedEnd>,
     before: Before,
+    generation: Option<JournalGeneration>,
     /// Whether this version of the machine has written the file. Another version may write other frames.
     is_ours: bool,
 }
@@ -320,7 +375,8 @@ impl Default for JournalReading {
     fn default() -> JournalReading {
         let (beginning, records, lives, upgrades) = (None, Vec::new(), Vec::new(), Vec::new());
         let before = Before::default();
-        JournalReading { beginning, records, lives, upgrades, end: None, before, is_ours: true }
+        let (end, generation) = (None, None);
+        JournalReading { beginning, records, lives, upgrades, end, before, generation, is_ours: true }
     }
 }
 
@@ -338,7 +394,10 @@ impl JournalReading {
         let strange = |problem| if is_ours { damaged(problem) } else { RecordedError::OtherMachine };
         let malformed = || strange("the content is not of its kind");
         let mut from = ByteReader(content);
-        if matches!(kind, kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED | kind::UPGRADE) {
+        if matches!(
+            kind,
+            kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED | kind::UPGRADE | kind::GENERATION
+        ) {
             from.number().filter(|&mark| mark <= offset as u64).ok_or_else(malformed)?;
         }
         match kind {
@@ -355,6 +414,15 @@ impl JournalReading {
                 let (records, life) = (self.records.len(), self.lives.last().map_or(0, |life| life.number));
                 self.upgrades.push(JournalUpgrade { records, life, program });
                 self.add(from).ok_or_else(malformed)?;
+            }
+            kind::GENERATION => {
+                let generation = JournalGeneration::read(&mut from).ok_or_else(malformed)?;
+                if self.generation.is_some() || !self.records.is_empty() || !self.lives.is_empty() {
+                    return Err(damaged("this frame does not belong here"));
+                }
+                self.before = generation.before;
+                self.lives.push(generation.life);
+                self.generation = Some(generation);
             }
             kind::END => self.end = Some(read_end(content).ok_or_else(malformed)?),
             _ => return Err(strange("a frame of an unknown kind")),

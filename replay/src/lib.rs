@@ -28,12 +28,14 @@
 mod breakpoint;
 mod debugger;
 mod file;
+mod generation;
 mod journal;
 mod pack;
 mod pattern;
 mod recorder;
 mod records;
 mod rerun;
+mod snapshot;
 #[cfg(test)]
 mod tests;
 
@@ -52,13 +54,15 @@ use esl::program::{self, ExecutionIdentity, Program, Summary};
 
 pub use breakpoint::{Breakpoint, StopError, Target};
 pub use debugger::Debugger;
-pub use file::{Beginning, FORMAT, GivenFunction, MAGIC, Recorded, RecordedEnd, RecordedError};
+pub use file::{Beginning, FORMAT, GivenFunction, MAGIC, Recorded, RecordedEnd, RecordedError, RunStart};
+pub use generation::{JournalGeneration, OpenCall};
 pub use journal::{
     JournalLife, JournalUpgrade, JournalWriter, RunJournal, journal_beginning, journal_end, journal_life,
 };
 pub use pattern::{FactPattern, NotAPattern};
 pub use recorder::FileRecorder;
-pub use rerun::{Replayed, Rerun, RerunError, begin_recorded};
+pub use rerun::{Replayed, Rerun, RerunError, begin_recorded, prepare_recorded};
+pub use snapshot::{RunSnapshot, add_to_sum, seal_snapshot, snapshot_file, snapshot_head};
 
 /// The setup of a run, beside its program and its host.
 #[derive(Clone, Debug, Default)]
@@ -157,6 +161,23 @@ pub fn beginning(program: &Program, setup: &RunSetup, machine: &Vm) -> Result<Be
     })
 }
 
+/// Reads a recorded run, or a journal of a durable run with the snapshot at which it begins.
+///
+/// # Errors
+/// [`ReplayError::File`] or [`ReplayError::Recording`].
+pub fn read_recorded(file: &Path) -> Result<Recorded, ReplayError> {
+    let bytes = std::fs::read(file).map_err(ReplayError::File)?;
+    let mut recorded = Recorded::read(&bytes).map_err(ReplayError::Recording)?;
+    if let Some(start) = &recorded.start {
+        let snapshot = snapshot_file(file).ok_or(RecordedError::NoSnapshot);
+        let snapshot = snapshot.and_then(|file| std::fs::read(file).map_err(|_| RecordedError::NoSnapshot));
+        let snapshot = snapshot.and_then(RunSnapshot::read).map_err(ReplayError::Recording)?;
+        let generation = start.generation.clone();
+        recorded.start = Some(Arc::new(RunStart { generation, snapshot: Some(snapshot) }));
+    }
+    Ok(recorded)
+}
+
 /// A replay that is over, and what the program has written in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Replay {
@@ -175,8 +196,7 @@ pub struct Replay {
 /// # Errors
 /// [`ReplayError`]; a replay that diverges returns [`Replayed::Diverged`].
 pub fn replay(file: &Path) -> Result<Replay, ReplayError> {
-    let bytes = std::fs::read(file).map_err(ReplayError::File)?;
-    let recorded = Recorded::read(&bytes).map_err(ReplayError::Recording)?;
+    let recorded = read_recorded(file)?;
     let written = Arc::new(Mutex::new((Vec::new(), Vec::new())));
     let kept = written.clone();
     let screen = move |output, bytes: &[u8]| {

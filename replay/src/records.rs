@@ -17,7 +17,7 @@ use esl_host::{
 use super::pack::{ByteReader, ByteWriter};
 
 /// The base of the difference that the next record states.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Before {
     time: u64,
     not_due: u64,
@@ -26,6 +26,22 @@ pub(super) struct Before {
 }
 
 impl Before {
+    /// Writes it, for a journal that begins here.
+    pub(super) fn write(&self, out: &mut ByteWriter) {
+        let Before { time, not_due, check, round } = *self;
+        let RunCheck { round: checked, ticks, canary } = check;
+        [time, not_due, round, checked, ticks].into_iter().for_each(|number| out.number(number));
+        out.0.extend_from_slice(&canary.to_le_bytes());
+    }
+
+    /// Reads it.
+    pub(super) fn read(from: &mut ByteReader<'_>) -> Option<Before> {
+        let (time, not_due, round) = (from.number()?, from.number()?, from.number()?);
+        let (checked, ticks) = (from.number()?, from.number()?);
+        let check = RunCheck { round: checked, ticks, canary: u64::from_le_bytes(from.array()?) };
+        Some(Before { time, not_due, check, round })
+    }
+
     /// Returns the last time that was answered.
     pub(super) fn time(&self) -> u64 {
         self.time
@@ -234,6 +250,7 @@ macro_rules! define_answers {
                     difference(out, &mut before.check.round, check.round);
                     difference(out, &mut before.check.ticks, check.ticks);
                     out.0.extend_from_slice(&check.canary.to_le_bytes());
+                    before.check.canary = check.canary;
                     before.round = check.round;
                 }
             }

@@ -10,7 +10,7 @@ use esl_vm::explore::FollowedRun;
 use esl_vm::load::LoadError;
 use esl_vm::run::RunOutcome;
 use esl_vm::task::TaskId;
-use esl_vm::vm::Vm;
+use esl_vm::vm::{Config, Vm};
 
 use super::file::{Beginning, Recorded, RecordedError, is_own};
 
@@ -90,8 +90,25 @@ impl Rerun {
             return Err(RerunError::Recording(RecordedError::OtherMachine));
         }
         let program = Program::from_bytes(&beginning.program).map_err(RerunError::Program)?;
-        let host = ReplayHost::new(recorded.records.clone()).with_screen(screen);
-        let begun = begin_recorded(&recorded.beginning, &program, wrap(host.clone()));
+        let host = match &recorded.start {
+            None => ReplayHost::new(recorded.records.clone()),
+            Some(_) => ReplayHost::preparing(recorded.records.clone()),
+        };
+        let host = host.with_screen(screen);
+        let begun = match &recorded.start {
+            None => begin_recorded(&recorded.beginning, &program, wrap(host.clone())),
+            Some(start) => {
+                let snapshot = start.snapshot.as_ref();
+                let snapshot = snapshot.ok_or(RerunError::Recording(RecordedError::NoSnapshot))?;
+                let machine = prepare_recorded(&recorded.beginning, Some(snapshot.range), wrap(host.clone()));
+                let mut machine = machine.map_err(RerunError::Machine)?;
+                let is_loaded = machine.load_state(&snapshot.state);
+                let main = machine.main_task().filter(|_| is_loaded);
+                let main = main.ok_or(RerunError::Recording(RecordedError::NoSnapshot))?;
+                host.start(start.generation.not_due, start.generation.time());
+                Ok((machine, main))
+            }
+        };
         // A world that has diverged has made the preparations fail.
         let (mut machine, main) = begun.map_err(|error| match host.divergence() {
             Some(_) => RerunError::Recording(RecordedError::Damaged {
@@ -231,7 +248,22 @@ pub fn begin_recorded(
     program: &Program,
     host: Box<dyn Host + Send>,
 ) -> Result<(Vm, TaskId), Error> {
-    let mut machine = program::machine(beginning.config.clone(), host)?;
+    let mut machine = prepare_recorded(beginning, None, host)?;
+    let main = program::begin(&mut machine, program)?;
+    Ok((machine, main))
+}
+
+/// Makes a machine as for [`begin_recorded`], up to the beginning of the program. Its heap is in a range of
+/// addresses if there is one: then a state may be loaded.
+///
+/// # Errors
+/// [`Error`].
+pub fn prepare_recorded(
+    beginning: &Beginning,
+    range: Option<usize>,
+    host: Box<dyn Host + Send>,
+) -> Result<Vm, Error> {
+    let mut machine = program::machine(Config { range, ..beginning.config.clone() }, host)?;
     if beginning.has_operators {
         program::load_operators(&mut machine)?;
     }
@@ -247,6 +279,5 @@ pub fn begin_recorded(
     program::set_module_folders(&mut machine, &beginning.folders)?;
     program::set_program_file(&mut machine, &beginning.program_file)?;
     program::set_traces(&mut machine, &beginning.traces)?;
-    let main = program::begin(&mut machine, program)?;
-    Ok((machine, main))
+    Ok(machine)
 }

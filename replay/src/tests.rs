@@ -124,7 +124,7 @@ fn data() -> Vec<Datum> {
 }
 
 /// A record of every kind.
-fn records() -> Vec<NotedRecord> {
+pub(crate) fn records() -> Vec<NotedRecord> {
     let failure = || HostFailure { cause: "LOST".into(), arguments: data() };
     let call = |function| Question::Call { function, arguments: data(), goes_first: true };
     let incoming = vec![
@@ -191,7 +191,7 @@ fn records() -> Vec<NotedRecord> {
 }
 
 /// Bytes of a file in which each of some records has a frame of its own.
-fn bytes_of(records: &[NotedRecord]) -> Vec<u8> {
+pub(crate) fn bytes_of(records: &[NotedRecord]) -> Vec<u8> {
     let mut bytes = beginning_bytes(&beginning());
     let mut unwritten = JournalWriter::default();
     for noted in records {

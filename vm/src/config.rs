@@ -34,6 +34,9 @@ pub struct Config {
     pub cleanup_time: u64,
     /// Whether the state of the machine may be saved and restored ([`crate::vm::Vm::save`]).
     pub snapshots: bool,
+    /// Where the heap has its memory, so that the state of the machine may be stored for another process
+    /// ([`crate::vm::Vm::store_state`]): the start of a range of addresses; `None` for anywhere.
+    pub range: Option<usize>,
 }
 
 list_state! { Config {
@@ -47,6 +50,7 @@ list_state! { Config {
     cleanup_ticks: Run,
     cleanup_time: Run,
     snapshots: Process,
+    range: Process,
 } }
 
 impl Config {
@@ -62,6 +66,7 @@ impl Config {
         cleanup_ticks: CLEANUP_TICKS,
         cleanup_time: CLEANUP_TIME,
         snapshots: false,
+        range: None,
     };
 
     /// Returns the limit of a task's stack in words.

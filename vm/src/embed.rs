@@ -61,8 +61,12 @@ impl Vm {
     /// # Errors
     /// [`AllocError`] if the limit of memory leaves no room for what every machine has.
     pub fn new(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, AllocError> {
-        let heap_config =
-            HeapConfig { limit: config.memory, images: config.snapshots, ..HeapConfig::default() };
+        let heap_config = HeapConfig {
+            limit: config.memory,
+            images: config.snapshots,
+            range: config.range,
+            ..HeapConfig::default()
+        };
         let mut heap = trust::new_heap(heap_config);
         let names = Names::new(&mut heap)?;
         let starter = make_starter(&mut heap)?;
@@ -78,6 +82,7 @@ impl Vm {
             natives: &NATIVES,
             exchange: Exchange::new(),
             watch: Watch::default(),
+            between_rounds: None,
             compiled: CompiledFunctions::default(),
             embedder: Embedder { pinned: vec![starter, any_event], ..Embedder::default() },
             config,

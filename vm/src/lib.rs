@@ -44,6 +44,7 @@ mod report;
 mod shape;
 mod snapshot;
 mod state;
+pub mod stored;
 mod tier;
 mod trust;
 mod types;

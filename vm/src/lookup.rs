@@ -60,6 +60,11 @@ pub(crate) struct Lookups {
 }
 
 impl Lookups {
+    /// Goes on after the search that has led to this entry.
+    pub(crate) fn after(last: LastLookup) -> Lookups {
+        Lookups { last, entries: FoundEntries::default() }
+    }
+
     /// Returns these lookups without what a state of the machine can do without.
     pub(crate) fn saved(&self) -> Lookups {
         Lookups { last: self.last, entries: FoundEntries::default() }

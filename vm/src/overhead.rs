@@ -5,6 +5,8 @@
 //! paid for: by the time of what runs between them, or by what is allocated there. Some are allowed in
 //! advance. A further request then fails because the heap is exhausted.
 
+use esl_heap::stored;
+
 /// A collection is paid for by the allocation of one part in so many of the limit.
 const PART_OF_LIMIT: u64 = 64;
 
@@ -67,6 +69,8 @@ impl CollectionOverhead {
         [self.owed, self.at, self.allocated, self.last]
     }
 }
+
+stored! { CollectionOverhead { owed, at, allocated, last } }
 
 #[cfg(test)]
 mod tests {

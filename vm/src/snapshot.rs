@@ -99,6 +99,7 @@ impl Vm {
             exchange,
             watch,
             embedder,
+            between_rounds: _,
             config,
         } = self;
         let Outside {

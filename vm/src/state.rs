@@ -85,7 +85,7 @@ state! {
         course { config }
         parts { heap, embedder, exchange, watch }
         transient { cpu }
-        process { natives, compiled }
+        process { natives, compiled, between_rounds }
     }
 }
 

@@ -219,6 +219,12 @@ pub(crate) struct LoopUse {
     pub(crate) is_calm: bool,
 }
 
+#[cfg(not(feature = "native"))]
+impl CompiledFunctions {
+    /// Lets calls of all installed code lead to its first instruction, or to the machine code again.
+    pub(crate) fn lead_to_interpreter(&mut self, _leads: bool) {}
+}
+
 #[cfg(all(test, feature = "native"))]
 mod tests {
     use super::*;

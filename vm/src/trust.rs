@@ -7,10 +7,14 @@
 
 #![allow(unsafe_code)]
 
+use std::fmt;
+
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::Work;
 use esl_bytecode::module::{FunctionNumber, Module};
 use esl_bytecode::verify::{VerifyError, verify_function, verify_outline};
+
+use esl_heap::store::StoredBytes;
 
 use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap, HeapConfig, HeapImage};
@@ -42,6 +46,66 @@ pub(crate) fn restore_heap(heap: &mut Heap, image: &HeapImage) -> bool {
     // SAFETY: `snapshot` takes the image together with all values that the machine holds, and puts these back
     // together with it. The documentation of `Vm` requires the same of other holders of values.
     unsafe { heap.restore(image) }
+}
+
+/// The state of a machine between two turns, as bytes.
+#[derive(Clone)]
+pub struct MachineState {
+    /// The bytes, from `start` on.
+    bytes: Vec<u8>,
+    start: usize,
+}
+
+impl MachineState {
+    /// Takes bytes that [`Vm::store_state`](crate::vm::Vm::store_state) has made in a machine of this build.
+    /// They are as trusted as this program: they contain code that no verifier sees.
+    pub fn from_trusted_bytes(bytes: Vec<u8>) -> MachineState {
+        MachineState { bytes, start: 0 }
+    }
+
+    /// As [`MachineState::from_trusted_bytes`], of bytes that follow others.
+    pub fn from_trusted_end(bytes: Vec<u8>, start: usize) -> MachineState {
+        MachineState { start: start.min(bytes.len()), bytes }
+    }
+
+    /// Returns the bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes[self.start..]
+    }
+}
+
+impl PartialEq for MachineState {
+    fn eq(&self, other: &MachineState) -> bool {
+        self.bytes() == other.bytes()
+    }
+}
+
+impl Eq for MachineState {}
+
+impl fmt::Debug for MachineState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "MachineState({} bytes)", self.bytes().len())
+    }
+}
+
+/// Reads the state of a machine of this build, which was written with its heap in the same range of
+/// addresses.
+pub(crate) fn stored_bytes(state: &MachineState) -> StoredBytes<'_> {
+    // SAFETY: `MachineState` holds what a machine has stored; an embedder that makes one of bytes promises
+    // that they are those. `stored` reads the types that it writes, together with the contents of the heap.
+    unsafe { StoredBytes::new(state.bytes()) }
+}
+
+/// Makes the contents of a machine's heap those that were stored, with which the machine's values are
+/// replaced. `None` if they do not fit; then the machine is of no use.
+pub(crate) fn load_heap(
+    heap: &mut Heap,
+    from: &mut StoredBytes<'_>,
+    memory: &mut StoredBytes<'_>,
+) -> Option<()> {
+    // SAFETY: `MachineState` holds bytes of a heap in the same range, as `stored_bytes` says; the caller
+    // replaces all values of the machine by those behind.
+    unsafe { heap.load_contents(from, memory) }
 }
 
 /// Creates a vector of nothing yet for the loader of images, which does not pass it on and changes it by

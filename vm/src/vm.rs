@@ -25,6 +25,9 @@ pub type Native = fn(&mut Vm, &[Value]) -> Outcome;
 /// The functions that are written in Rust, by the numbers of their rows in the table.
 pub(crate) type Natives = [Native; BUILTINS.len()];
 
+/// A function of the embedder's that is called between two rounds of the machine.
+pub(crate) type BetweenRounds = Box<dyn FnMut(&mut Vm) + Send>;
+
 /// A virtual machine.
 ///
 /// The values that it hands out belong to it: they are of no use to another machine, and good until it runs
@@ -52,6 +55,8 @@ pub struct Vm {
     pub(crate) watch: Watch,
     /// Objects kept for the embedder, and the embedder's requests.
     pub(crate) embedder: Embedder,
+    /// Is called between two rounds.
+    pub(crate) between_rounds: Option<BetweenRounds>,
     /// The machine code of functions.
     pub(crate) compiled: CompiledFunctions,
     /// Limits and settings.

@@ -40,6 +40,7 @@ const LAYERS: &[&str] = &[
     "number",
     "types",
     "interp",
+    "stored",
     "report",
     "run",
     "environment",

@@ -16,6 +16,7 @@
 
 mod change;
 mod entries;
+mod packed;
 mod standard;
 
 use std::borrow::Cow;
@@ -30,11 +31,24 @@ use crate::compile::InternError;
 use crate::symbol::{Home, KEYWORD_PACKAGE, Symbol};
 
 use entries::NameEntries;
+pub use packed::{pack_symbol, unpack_symbol};
 pub use standard::{CL_NAMES, TAKEN_OVER};
 
 /// A package: its number in the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PackageId(u32);
+
+impl PackageId {
+    /// Returns the number of the package in its table.
+    pub const fn number(self) -> u32 {
+        self.0
+    }
+
+    /// Returns the package with this number, of a table that has so many.
+    pub const fn from_number(number: u32) -> PackageId {
+        PackageId(number)
+    }
+}
 
 /// In what way a package has a symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,6 +14,7 @@ mod pattern;
 
 use esl_heap::Value;
 use esl_heap::heap::{AllocError, Heap};
+use esl_heap::{stored, stored_enum};
 
 use super::bucket::{Buckets, finish, mix};
 
@@ -351,3 +352,12 @@ impl TermData {
         }
     }
 }
+
+stored! { Term { 0 } }
+stored_enum! { TermData {
+    Free = 0, Pair { car, cdr, size, is_ground } = 1, Text(text) = 2, Bits(bits) = 3, Big(is_negative, limbs) = 4,
+    Ratio(over, under) = 5, Complex(real, imaginary) = 6, Float(bits) = 7, Record(class, slots) = 8,
+    Object(object) = 9,
+} }
+stored! { TermNode { data, holders } }
+stored! { Terms { nodes, buckets, free, unheld, objects, bytes, work } }

@@ -5,7 +5,7 @@
 //! behind it, are the facts H1 to H5 of [`super`]. A slice of the heap borrows the heap, so nothing can be
 //! stored, allocated or collected while it is in use.
 //!
-//! Every store of a value goes through [`Heap::store`], the write barrier, or into slots that
+//! Every store of a value goes through [`Heap::store_contents`], the write barrier, or into slots that
 //! [`Heap::slots_mut`] has logged; stores of raw data need none. Some parts of objects the interpreter trusts
 //! without a test: the function of a symbol, the code of a function, the data of an array, the class of a
 //! structure. These have setters of their own, or none.

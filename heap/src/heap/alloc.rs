@@ -82,6 +82,8 @@ pub(super) struct Region {
     fresh: Option<(usize, usize)>,
 }
 
+crate::stored! { Region { next, end, hole_end, counted, black_from, scan, cursor, fresh } }
+
 list_state! {
     Region {
         next: Address,
@@ -356,7 +358,7 @@ impl Heap {
     /// Takes a new arena from the system. Its number is the least free one.
     fn grow(&mut self) -> Option<usize> {
         let number = self.arenas.iter().position(Option::is_none).unwrap_or(self.arenas.len());
-        let arena = Arena::new(u32::try_from(number).ok()?, self.has_images);
+        let arena = Arena::new(u32::try_from(number).ok()?, self.has_images, self.range.as_ref());
         self.is_refused |= arena.is_none();
         let mut arena = arena?;
         arena.is_lent = self.taken().saturating_add(ARENA) > self.limit_for_all();
@@ -386,7 +388,14 @@ impl Heap {
             error => error,
         })?;
         // The current epoch: marked while marking and not yet swept while sweeping; stale by the next cycle.
-        let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch, is_zeroed);
+        let large = LargeObject::new(
+            bytes,
+            self.large_number,
+            self.large.len(),
+            self.epoch,
+            is_zeroed,
+            self.range.as_ref(),
+        );
         self.is_refused |= large.is_none();
         let large = large.ok_or(AllocError::NeedCollection)?;
         let object = large.object();

@@ -17,6 +17,7 @@
 
 use super::layout::GRANULE;
 use super::metadata::{self, SweepCounts};
+use super::range::AddressRange;
 use crate::list_state;
 use crate::state::StateSink;
 use std::alloc::{Layout, alloc, dealloc};
@@ -69,6 +70,8 @@ pub(super) struct BlockInfo {
     pub(super) counts: SweepCounts,
 }
 
+crate::stored_enum! { BlockState { Unswept = 0, Swept = 1, Taken = 2 } }
+crate::stored! { BlockInfo { state, counts } }
 list_state! { ArenaHeader { number: Derived, grays: Derived } }
 list_state! { BlockInfo { state: Run by |&state: &BlockState, sink: &mut dyn StateSink| sink.word(state as u64), counts: Parts } }
 
@@ -84,8 +87,9 @@ impl BlockInfo {
     }
 }
 
-/// Memory of an arena. An image of the heap shares it, so that the arena can be had again at its address.
-pub(super) struct ArenaMemory(NonNull<u8>);
+/// Memory of an arena, in the range of the heap if it has one. An image of the heap shares it, so that the
+/// arena can be had again at its address.
+pub(super) struct ArenaMemory(NonNull<u8>, Option<Arc<AddressRange>>);
 
 // SAFETY: this only frees the memory; whatever reads or writes it goes through the heap, which has the arena.
 unsafe impl Send for ArenaMemory {}
@@ -94,8 +98,11 @@ unsafe impl Sync for ArenaMemory {}
 
 impl Drop for ArenaMemory {
     fn drop(&mut self) {
-        // SAFETY: `Arena::new` has allocated the memory with this layout; it is dropped once.
-        unsafe { dealloc(self.0.as_ptr(), LAYOUT) }
+        match &self.1 {
+            Some(range) => range.clear(self.0.addr().get(), ARENA),
+            // SAFETY: `Arena::new` has allocated the memory with this layout; it is dropped once.
+            None => unsafe { dealloc(self.0.as_ptr(), LAYOUT) },
+        }
     }
 }
 
@@ -113,16 +120,22 @@ list_state! { Arena { base: Visited, blocks: Parts, is_lent: Run, memory: Proces
 
 impl Arena {
     /// Creates an arena with empty blocks; `None` if the system has no memory. All of it is initialised if it
-    /// `is_zeroed`.
-    pub(super) fn new(number: u32, is_zeroed: bool) -> Option<Arena> {
+    /// `is_zeroed`. It is in the range, if there is one, at the place of its number.
+    pub(super) fn new(number: u32, is_zeroed: bool, range: Option<&Arc<AddressRange>>) -> Option<Arena> {
         // SAFETY: the size is not zero. The metadata block is zeroed and the header written before anything
-        // reads them.
+        // reads them. Memory of a range is zero, and belongs to the arena of its number alone.
         unsafe {
-            let base = NonNull::new(alloc(LAYOUT))?;
-            base.write_bytes(0, if is_zeroed { ARENA } else { BLOCK });
+            let base = match range {
+                Some(range) => range.arena(number)?,
+                None => {
+                    let base = NonNull::new(alloc(LAYOUT))?;
+                    base.write_bytes(0, if is_zeroed { ARENA } else { BLOCK });
+                    base
+                }
+            };
             base.cast().write(ArenaHeader { number, grays: 0 });
             base.as_ptr().expose_provenance();
-            let memory = Arc::new(ArenaMemory(base));
+            let memory = Arc::new(ArenaMemory(base, range.cloned()));
             let arena = Arena { base, blocks: [BlockInfo::EMPTY; BLOCKS + 1], is_lent: false, memory };
             if cfg!(debug_assertions) {
                 for block in 1..=BLOCKS {
@@ -148,6 +161,11 @@ impl Arena {
         &self.memory
     }
 
+    /// Gives the blocks states and counts.
+    pub(super) fn set_blocks(&mut self, blocks: [BlockInfo; BLOCKS + 1]) {
+        self.blocks = blocks;
+    }
+
     /// Returns the states and counts of all blocks; that at 0 means nothing.
     pub(super) fn blocks(&self) -> [BlockInfo; BLOCKS + 1] {
         self.blocks
@@ -156,7 +174,20 @@ impl Arena {
     /// Returns the objects of a block, as bytes.
     ///
     /// # Safety
-    /// The arena was made zeroed, and no object of the block is used while the slice lives.
+    /// The arena was made zeroed, or in a range, and no object of the block is changed while the slice lives.
+    pub(super) unsafe fn objects(&self, block: usize) -> &[u8] {
+        // SAFETY: invariant 1: the arena is live; by the contract all of it is initialised, since objects
+        // are, and nothing changes the block; the slice borrows the arena.
+        unsafe {
+            let start: *const u8 = std::ptr::with_exposed_provenance(self.address(block));
+            std::slice::from_raw_parts(start, BLOCK)
+        }
+    }
+
+    /// Returns the objects of a block, as bytes that may be changed.
+    ///
+    /// # Safety
+    /// The arena was made zeroed, or in a range, and no object of the block is used while the slice lives.
     pub(super) unsafe fn objects_mut(&mut self, block: usize) -> &mut [u8] {
         // SAFETY: invariant 1: the arena is live; by the contract all of it is initialised, since objects
         // are, and nothing else refers to the block; the slice borrows the arena mutably.

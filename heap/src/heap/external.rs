@@ -37,6 +37,7 @@ pub(super) struct External {
     pub(super) wanted: usize,
 }
 
+crate::stored! { External { held, total, wanted } }
 list_state! { External { held: Derived, total: Derived, wanted: Run } }
 
 impl External {

@@ -10,6 +10,7 @@
 
 use super::arena::LARGE;
 use super::layout::{GRANULE, Header};
+use super::range::AddressRange;
 use crate::list_state;
 use crate::state::{StateSink, Stated};
 use std::alloc::{Layout, alloc, alloc_zeroed, dealloc, realloc};
@@ -35,6 +36,8 @@ pub(super) struct LargeHeader {
 }
 
 const _: () = assert!(size_of::<LargeHeader>() == 32 && size_of::<LargeHeader>().is_multiple_of(GRANULE));
+
+crate::stored! { LargeHeader { bytes, number, index, epoch, gray, filled } }
 
 list_state! {
     LargeHeader {
@@ -62,6 +65,8 @@ pub(super) const fn is_large(bytes: usize) -> bool {
 /// address.
 pub(super) struct LargeMemory {
     start: NonNull<LargeHeader>,
+    /// The range of the heap, if it has one: then the memory is there.
+    range: Option<Arc<AddressRange>>,
     /// Bytes from the system. The header may say less, of an object that is being freed.
     bytes: usize,
 }
@@ -74,6 +79,9 @@ unsafe impl Sync for LargeMemory {}
 
 impl Drop for LargeMemory {
     fn drop(&mut self) {
+        if let Some(range) = &self.range {
+            return range.give_back(self.start.addr().get(), self.bytes);
+        }
         // SAFETY: `LargeObject::new` or `shrink` has allocated the memory with this layout; it is dropped
         // once.
         unsafe { dealloc(self.start.as_ptr().cast(), Layout::from_size_align_unchecked(self.bytes, GRANULE)) }
@@ -106,17 +114,41 @@ impl LargeObject {
         index: usize,
         epoch: u8,
         is_zeroed: bool,
+        range: Option<&Arc<AddressRange>>,
     ) -> Option<LargeObject> {
         let bytes = footprint(bytes);
         let layout = Layout::from_size_align(bytes, GRANULE).ok()?;
         // SAFETY: the size is not zero, and the header is written at once.
         unsafe {
-            let start = if is_zeroed { alloc_zeroed(layout) } else { alloc(layout) };
-            let start = NonNull::new(start)?.cast::<LargeHeader>();
+            let start = match range {
+                Some(range) => range.take(bytes)?,
+                None => NonNull::new(if is_zeroed { alloc_zeroed(layout) } else { alloc(layout) })?,
+            };
+            let start = start.cast::<LargeHeader>();
             start.write(LargeHeader { bytes, number, index, epoch, gray: false, filled: 0 });
             start.as_ptr().expose_provenance();
-            Some(LargeObject { start, memory: Arc::new(LargeMemory { start, bytes }), numbers: Vec::new() })
+            let memory = Arc::new(LargeMemory { start, range: range.cloned(), bytes });
+            Some(LargeObject { start, memory, numbers: Vec::new() })
         }
+    }
+
+    /// Returns an object at `start` in a range, with this header; `None` unless there is room. Its elements
+    /// are zero.
+    pub(super) fn at(start: usize, header: LargeHeader, range: &Arc<AddressRange>) -> Option<LargeObject> {
+        let bytes = header.bytes;
+        if bytes < footprint(LARGE) {
+            return None;
+        }
+        let start = range.claim(start, bytes)?.cast::<LargeHeader>();
+        let memory = Arc::new(LargeMemory { start, range: Some(range.clone()), bytes });
+        // SAFETY: the room was taken just now, and is larger than a header.
+        unsafe { start.write(header) };
+        Some(LargeObject { start, memory, numbers: Vec::new() })
+    }
+
+    /// Returns the address of the allocation.
+    pub(super) fn address(&self) -> usize {
+        self.start.addr().get()
     }
 
     /// Returns the object with this memory, which has this header and pages of these numbers again.
@@ -141,7 +173,20 @@ impl LargeObject {
     /// Returns the object proper, as bytes.
     ///
     /// # Safety
-    /// The object was made zeroed, its header states its bytes, and it is not used while the slice lives.
+    /// The object was made zeroed, or in a range, its header states its bytes, and it is not changed while
+    /// the slice lives.
+    pub(super) unsafe fn bytes(&self) -> &[u8] {
+        let bytes = self.header().bytes - footprint(0);
+        // SAFETY: so many bytes follow the header; by the contract they are initialised and nothing changes
+        // them.
+        unsafe { std::slice::from_raw_parts(self.object().as_ptr(), bytes) }
+    }
+
+    /// Returns the object proper, as bytes that may be changed.
+    ///
+    /// # Safety
+    /// The object was made zeroed, or in a range, its header states its bytes, and it is not used while the
+    /// slice lives.
     pub(super) unsafe fn bytes_mut(&mut self) -> &mut [u8] {
         let bytes = self.header().bytes - footprint(0);
         // SAFETY: so many bytes follow the header; by the contract they are initialised and nothing else
@@ -164,6 +209,12 @@ impl LargeObject {
         let new = old.checked_sub(bytes).filter(|&new| bytes > 0 && new > super::arena::LARGE)?;
         // Memory that an image shares stays; it counts as given back all the same.
         if let Some(memory) = Arc::get_mut(&mut self.memory) {
+            if let Some(range) = &memory.range {
+                range.give_back(memory.start.addr().get() + new, old - new);
+                memory.bytes = new;
+                self.header_mut().bytes = new;
+                return Some(bytes);
+            }
             // SAFETY: this is the layout of the allocation, and `new` is a smaller size; the header is at the
             // start, which stays.
             unsafe {

@@ -56,6 +56,7 @@ pub(super) struct Marker {
     pub(super) bytes: u64,
 }
 
+crate::stored! { Marker { stack, capacity, pieces, grays, bytes } }
 list_state! { Marker { stack: Run, capacity: Run, pieces: Run, grays: Derived, bytes: Run } }
 
 impl Marker {

@@ -59,6 +59,7 @@ pub struct SweepCounts {
     pub largest: usize,
 }
 
+crate::stored! { SweepCounts { free, largest } }
 list_state! { SweepCounts { free: Run, largest: Run } }
 
 /// Returns the eight bytes at `at`, if there are that many and `at` is a multiple of eight.

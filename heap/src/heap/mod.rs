@@ -8,6 +8,7 @@
 //! arena     1 MiB pieces of memory, in blocks            large     big objects, one by one
 //! metadata  one byte per granule                     external  memory outside that counts against the limit
 //! image     the contents at a time, to be had again  check     contradictions, for tests
+//! contents  the contents, as bytes                    range     addresses that are the same in each process
 //! ```
 //!
 //! Objects never move. A cycle of the collector marks what is reachable, in slices between which the program
@@ -57,22 +58,26 @@ mod alloc;
 mod arena;
 mod check;
 mod code;
+mod contents;
 mod external;
 mod image;
 mod large;
 mod mark;
 mod metadata;
 mod object;
+mod range;
 mod raw;
 mod sweep;
 
 pub use alloc::AllocError;
 pub use check::HeapContradiction;
 pub use code::CodeParts;
+pub use contents::HeapMemory;
 pub use external::Holder;
 pub use image::HeapImage;
 pub use layout::Kind;
 pub use metadata::{NotCanonical, SweepCounts};
+pub use range::{range_start, words_at};
 pub use raw::BignumRef;
 
 use crate::list_state;
@@ -83,6 +88,7 @@ use arena::{ARENA, Arena};
 use external::External;
 use large::LargeObject;
 use mark::Marker;
+use range::AddressRange;
 use std::sync::Arc;
 use sweep::Sweep;
 
@@ -112,11 +118,15 @@ pub struct HeapConfig {
     pub mark_stack: usize,
     /// Whether images may be taken of the heap ([`Heap::save`]). All memory is initialised for it.
     pub images: bool,
+    /// Where the heap has its memory, so that the contents may be stored in a file
+    /// ([`Heap::store_contents`]): the start of a range of addresses that it reserves; `None` for anywhere.
+    /// [`range_start`] proposes one.
+    pub range: Option<usize>,
 }
 
 impl Default for HeapConfig {
     fn default() -> Self {
-        HeapConfig { limit: 1 << 30, cycle_floor: 8 << 20, mark_stack: 128 << 10, images: false }
+        HeapConfig { limit: 1 << 30, cycle_floor: 8 << 20, mark_stack: 128 << 10, images: false, range: None }
     }
 }
 
@@ -209,6 +219,8 @@ pub struct Heap {
 
     stats: HeapStats,
 
+    /// The addresses of its memory, if they are its own.
+    range: Option<Arc<AddressRange>>,
     /// Whether images may be taken.
     has_images: bool,
     /// Tells its images from those of other heaps.
@@ -218,6 +230,8 @@ pub struct Heap {
     /// Whether the system has had no memory for an arena or a large object.
     is_refused: bool,
 }
+
+crate::stored! { HeapStats { cycles, slices, longest_slice, live, allocated, committed, peak } }
 
 list_state! { Pacing { floor: Run, threshold: Run, since_cycle: Run, black: Run, owed: Run } }
 
@@ -255,6 +269,7 @@ list_state! {
         limit: Run,
         code_entry: Process,
         stats: Parts,
+        range: Process,
         has_images: Process,
         identity: Process,
         numbered: Process,
@@ -294,6 +309,7 @@ impl Heap {
             limit: config.limit.max(ARENA),
             code_entry: None,
             stats: HeapStats::default(),
+            range: config.range.and_then(|start| AddressRange::reserve(start, config.limit.max(ARENA))),
             has_images: config.images,
             identity: Arc::default(),
             numbered: 0,

@@ -39,6 +39,7 @@ pub(super) struct Sweep {
     live: u64,
 }
 
+crate::stored! { Sweep { at, large, spares, live } }
 list_state! { Sweep { at: Run, large: Run, spares: Run, live: Run } }
 
 impl Heap {

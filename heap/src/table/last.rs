@@ -21,6 +21,8 @@ pub struct LastLookup {
     pub is_steady: bool,
 }
 
+crate::stored! { LastLookup { key, entry, distance, is_steady } }
+
 impl Default for LastLookup {
     fn default() -> LastLookup {
         LastLookup { key: Value::UNBOUND, entry: 0, distance: 0, is_steady: false }

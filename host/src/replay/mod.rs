@@ -6,6 +6,7 @@
 
 mod divergence;
 mod question;
+mod start;
 mod text;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -34,6 +35,8 @@ enum AnswerSource {
     /// The records.
     #[default]
     Records,
+    /// Nothing yet, as the machine is not at the place where the records begin.
+    Preparing,
     /// Nothing, as the replay has diverged.
     Diverged(Divergence),
     /// Nothing, as this was asked after the last record.
@@ -435,7 +438,7 @@ impl Host for ReplayHost {
                 let comes_back = std::mem::take(&mut progress.comes_back);
                 return match progress.source {
                     _ if !comes_back => Vec::new(),
-                    AnswerSource::Nothing => vec![Incoming::Stop],
+                    AnswerSource::Nothing | AnswerSource::Preparing => vec![Incoming::Stop],
                     // The signal cuts the end of the run short, if that is where it is.
                     _ => vec![Incoming::Signal(ProcessSignal::Interrupt), Incoming::Stop],
                 };

@@ -27,6 +27,8 @@ macro_rules! define_known {
             $( pub(crate) $field: Value, )*
         }
 
+        esl_heap::stored! { Known { $( $field ),* } }
+
         impl Known {
             /// Placeholder until [`Known::intern`] has been called.
             pub(super) const NONE: Known = Known { $( $field: Value::NIL, )* };

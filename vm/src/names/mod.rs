@@ -39,6 +39,7 @@ pub mod load;
 mod opaque;
 mod package;
 pub mod records;
+mod stored;
 pub(crate) mod stream;
 
 pub(crate) use known::Known;
@@ -71,11 +72,18 @@ pub(crate) type GivenMap<K, V> = HashMap<K, V, BuildHasherDefault<GivenHash>>;
 /// and a run meets its roots in the same order each time.
 pub(crate) type RootMap<V> = IndexMap<u64, V, BuildHasherDefault<GivenHash>>;
 
+/// The objects of symbols, in the order in which they were made: a run meets its roots in the same order in
+/// each process.
+pub(crate) type SymbolMap = IndexMap<Symbol, Value, BuildHasherDefault<GivenHash>>;
+
 /// A set of keys that hash themselves well.
 pub(crate) type GivenSet<K> = std::collections::HashSet<K, BuildHasherDefault<GivenHash>>;
 
-/// Bytes of an entry of a table of symbols.
-const SYMBOL_BYTES: usize = size_of::<(Symbol, Value)>() + 1;
+/// Bytes of an entry of the table of symbols, with its hash and its place in the index.
+const SYMBOL_BYTES: usize = size_of::<(u64, Symbol, Value)>() + size_of::<usize>() + 1;
+
+/// Bytes of an entry of the table of names by address.
+const NAME_BYTES: usize = size_of::<(u64, Symbol)>() + 1;
 
 /// Bytes of an entry of a table of packages, with its share of the nodes.
 const OBJECT_BYTES: usize = 2 * size_of::<(Arc<str>, PackageId, Value)>();
@@ -91,7 +99,7 @@ pub(crate) struct Names {
     /// Whether names of the language may be defined: only while the library is being loaded.
     pub(crate) is_open: bool,
     /// Objects of symbols with a package.
-    pub(crate) symbols: CopyOnWrite<GivenMap<Symbol, Value>>,
+    pub(crate) symbols: CopyOnWrite<SymbolMap>,
     /// Names of symbol objects by address, filled on demand.
     pub(crate) symbol_of: RefCell<CopyOnWrite<GivenMap<u64, Symbol>>>,
     /// Number of the compiler's next uninterned symbol.
@@ -263,9 +271,10 @@ impl Names {
     /// # Errors
     /// As for every allocation.
     pub(crate) fn check_room(&self, heap: &mut Heap) -> Result<(), AllocError> {
-        let symbols = self.symbols.capacity() + self.symbol_of.borrow().capacity();
+        let symbols =
+            self.symbols.capacity() * SYMBOL_BYTES + self.symbol_of.borrow().capacity() * NAME_BYTES;
         let objects = self.package_objects.len() + self.homes.len();
-        let tables = symbols * SYMBOL_BYTES + objects * OBJECT_BYTES + self.classes.capacity() * CLASS_BYTES;
+        let tables = symbols + objects * OBJECT_BYTES + self.classes.capacity() * CLASS_BYTES;
         heap.set_external(Holder::Names, self.packages.bytes() + tables)
     }
 

@@ -6,9 +6,12 @@
 //! at a tick that is the same in every run.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
 use esl_bytecode::span::Span;
+use esl_heap::store::{Stored, StoredBytes};
+use esl_host::GoneObject;
 
 use crate::heap::{AllocError, Heap};
 use crate::names::{GivenMap, Names};
@@ -76,6 +79,9 @@ impl Names {
     }
 }
 
+/// An object that is stored: its number, the object, and the kind and the text of its thing.
+type StoredOpaque = (u64, (Value, (String, String)));
+
 impl Opaques {
     /// Returns the number of things held.
     pub(crate) fn len(&self) -> usize {
@@ -94,6 +100,32 @@ impl Opaques {
             }
             self.unreachable.push(datum);
         }
+    }
+
+    /// Adds the objects that the program holds to `out`, without their things.
+    pub(super) fn store(&self, out: &mut Vec<u8>) {
+        let mut held: Vec<StoredOpaque> = Vec::new();
+        for (&number, (object, datum)) in &self.held {
+            if let DatumKind::Opaque(thing) = datum.kind() {
+                held.push((number, (*object, (thing.kind().to_owned(), thing.text().to_owned()))));
+            }
+        }
+        held.sort_unstable_by_key(|&(number, _)| number);
+        self.made.store(out);
+        held.store(out);
+    }
+
+    /// Reads objects, for each of which stands a thing that is gone; `None` if the bytes end before.
+    pub(super) fn load(from: &mut StoredBytes<'_>) -> Option<Opaques> {
+        let mut opaques = Opaques::default();
+        opaques.made = Stored::load(from)?;
+        let held: Vec<StoredOpaque> = Stored::load(from)?;
+        for (number, (object, (kind, text))) in held {
+            let thing = OpaqueDatum::new(&kind, &text, Arc::new(GoneObject));
+            opaques.numbers.insert(thing.identity() as u64, number);
+            opaques.held.insert(number, (object, Datum::new(DatumKind::Opaque(thing), Span::default())));
+        }
+        Some(opaques)
     }
 
     /// Lets go of what the program cannot reach. A panic of the embedder's code goes no further.

@@ -8,7 +8,9 @@ use std::collections::BTreeMap;
 use esl_bytecode::datum::Datum;
 use esl_heap::state::{StateSink, Stated};
 use esl_host::machine::{Asked, Canceller, Console};
-use esl_host::{CallEffect, Host, HostCall, HostFailure, HostFunction, HostOperation, Inbox, Need, Output};
+use esl_host::{
+    ActionId, CallEffect, Host, HostCall, HostFailure, HostFunction, HostOperation, Inbox, Need, Output,
+};
 use indexmap::IndexMap;
 use rustc_hash::FxBuildHasher;
 
@@ -178,6 +180,27 @@ impl Outside {
             let operation = HostOperation::new(number, arguments, self.inbox.clone(), canceller.clone());
             function(operation.with_action(action));
         });
+    }
+
+    /// Begins an operation again that is under way, in the state that the machine has, by the function of
+    /// this name. Returns whether there are both.
+    pub(crate) fn begin_again(
+        &mut self,
+        number: u64,
+        name: &str,
+        arguments: &[Datum],
+        action: ActionId,
+    ) -> bool {
+        let Some(open) = self.operations.open.get_mut(&number) else { return false };
+        let Some(Given { function: HostFunction::Operation(function), .. }) = self.functions.get_mut(name)
+        else {
+            return false;
+        };
+        open.canceller = Canceller::default();
+        let canceller = open.canceller.clone();
+        let operation = HostOperation::new(number, arguments.to_vec(), self.inbox.clone(), canceller);
+        function(operation.with_action(Some(action)));
+        true
     }
 
     /// Calls `visit` with every value.

@@ -1,6 +1,7 @@
 //! The operations under way, as the machine knows them.
 
 use esl_heap::list_state;
+use esl_heap::stored;
 use esl_host::machine::Canceller;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -121,3 +122,6 @@ impl Operations {
         self.open.values().for_each(|open| visit(open.handle));
     }
 }
+
+stored! { OpenOperation { handle, is_cancelled, is_detached, begun_by } with { canceller: Canceller::default() } }
+stored! { Operations { open, begun, by_task } }

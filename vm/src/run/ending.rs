@@ -41,10 +41,10 @@ pub(super) fn end_task(vm: &mut Vm, id: TaskId) {
 
 /// Runs tasks until all have ended, or the named one, without the budget of the run.
 fn run_cleanups(vm: &mut Vm, id: Option<TaskId>) {
-    let budget = vm.config.budget.take();
+    let (budget, between_rounds) = (vm.config.budget.take(), vm.between_rounds.take());
     // A request to come back is for the run that is over.
     while run_tasks(vm, id, u64::MAX, true) == RunOutcome::Stopped && !vm.embedder.is_cut_short {}
-    vm.config.budget = budget;
+    (vm.config.budget, vm.between_rounds) = (budget, between_rounds);
 }
 
 /// Cancels the operations under way, and waits until those have stopped that are waited for.

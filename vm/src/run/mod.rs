@@ -122,6 +122,13 @@ impl Vm {
         self.outside.host.replay_state() == ReplayState::Replays
     }
 
+    /// Sets a function that is called between two rounds, when no task runs. It may store the state of the
+    /// machine, and must not change it. It is not called while the machine waits for the end of a task that
+    /// was named, or of all at the end of a run: its next steps then are not part of its state.
+    pub fn on_round(&mut self, function: impl FnMut(&mut Vm) + Send + 'static) {
+        self.between_rounds = Some(Box::new(function));
+    }
+
     /// Returns how far the run is.
     pub fn check(&self) -> RunCheck {
         let mut canary = self.scheduler.canary;
@@ -152,6 +159,14 @@ fn tell_how_far(vm: &mut Vm) {
     vm.outside.host.check(check);
 }
 
+/// Calls the embedder's function, which finds the state of the machine between two turns.
+#[cold]
+fn call_between_rounds(vm: &mut Vm) {
+    let Some(mut function) = vm.between_rounds.take() else { return };
+    function(vm);
+    vm.between_rounds.get_or_insert(function);
+}
+
 /// Runs tasks in turn, at most for `ticks`, until the named one has ended. `may_wait` says whether to sleep
 /// while all of them wait.
 fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> RunOutcome {
@@ -170,6 +185,9 @@ fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> Run
         if let Some(turn) = vm.scheduler.open_turn.take() {
             go_on_with_turn(vm, turn, end);
             continue;
+        }
+        if vm.between_rounds.is_some() && id.is_none() {
+            call_between_rounds(vm);
         }
         vm.scheduler.rounds += 1;
         if vm.scheduler.rounds.is_multiple_of(CHECK_ROUNDS) {

@@ -9,6 +9,7 @@
 use crate::task::{AccountId, LimitNumber, TaskIndex};
 use esl_heap::list_state;
 use esl_heap::state::{StateSink, Stated};
+use esl_heap::{stored, stored_enum};
 
 /// Subject of an account: it ends when the account is spent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -305,3 +306,8 @@ impl Accounts {
         least as u64
     }
 }
+
+stored_enum! { AccountOwner { Form(task, limit) = 0, Tasks = 1, None = 2 } }
+stored_enum! { Measure { Ticks = 0, Bytes = 1, Tasks = 2, Operations = 3 } }
+stored! { Account { measure, left, is_spent, is_quota, parent, users, owner } }
+stored! { Accounts { accounts, free, bytes_counted } }

@@ -2,6 +2,7 @@
 
 use esl_heap::list_state;
 use esl_heap::state::{StateSink, Stated};
+use esl_heap::{stored, stored_enum};
 use std::collections::VecDeque;
 
 /// Source of choices.
@@ -100,6 +101,9 @@ fn next_random(state: &mut u64) -> u64 {
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     z ^ (z >> 31)
 }
+
+stored_enum! { ChoiceSource { First = 0, Seeded(state) = 1, Given(rest) = 2 } }
+stored! { Choices { source, record } }
 
 #[cfg(test)]
 mod tests {

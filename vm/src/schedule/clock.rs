@@ -1,5 +1,6 @@
 //! Readings of the host's clock.
 
+use esl_heap::stored;
 use esl_host::Host;
 
 /// When the clock was read, and what it said.
@@ -38,3 +39,5 @@ impl Clock {
         self.now
     }
 }
+
+stored! { Clock { is_virtual, now, looked_at, moved_at, more_is_due, idled } }

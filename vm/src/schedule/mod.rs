@@ -19,6 +19,7 @@ mod clock;
 mod point;
 mod portion;
 mod queues;
+mod stored;
 mod timer;
 mod turn;
 
@@ -32,6 +33,7 @@ pub(crate) use queues::RunQueues;
 pub(crate) use timer::{Due, Timer, Timers};
 pub(crate) use turn::{Parking, Turn, TurnEnd};
 
+use esl_heap::stored;
 use esl_host::machine::Canary;
 
 use crate::config::Config;
@@ -414,3 +416,6 @@ fn is_wanted(tasks: &Tasks, timer: Timer) -> bool {
         Due::Cleanup => task.runs_cleanup(),
     }
 }
+
+stored! { EndOfAll { left } }
+stored! { Counts { alive, foreground, made, made_at_end, turns, switches } }

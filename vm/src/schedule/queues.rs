@@ -12,6 +12,7 @@
 //! task changes queues without a search.
 
 use esl_heap::list_state;
+use esl_heap::stored;
 use std::collections::VecDeque;
 
 use super::Choices;
@@ -127,6 +128,9 @@ fn pop(queue: &mut VecDeque<Queued>, tasks: &Tasks, choices: &mut Choices) -> Op
     }
     None
 }
+
+stored! { Queued { index, serial } }
+stored! { RunQueues { queues, occupied, urgent, turns } }
 
 #[cfg(test)]
 mod tests {

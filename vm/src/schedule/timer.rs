@@ -6,6 +6,7 @@
 
 use esl_heap::list_state;
 use esl_heap::state::{StateSink, Stated};
+use esl_heap::{stored, stored_enum};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -105,6 +106,10 @@ impl Timers {
         self.heap.pop().map(|Reverse(timer)| timer)
     }
 }
+
+stored_enum! { Due { Wait(serial) = 0, Limit(number) = 1, Cleanup = 2 } }
+stored! { Timer { time, sequence, index, due } }
+stored! { Timers { heap, sequence, sweep_at } }
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,7 @@
 //! The turn of the running task.
 
 use crate::task::{Shortage, TaskEnd, TaskIndex};
+use esl_heap::{stored, stored_enum};
 
 /// Why a task is about to park.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -98,3 +99,9 @@ impl Default for Turn {
         }
     }
 }
+
+stored_enum! { Parking { Input = 0, Output = 1, Wait(deadline) = 2 } }
+stored_enum! { TurnEnd { Spent = 0, Cut = 1, Passed = 2, Held = 3 } }
+stored! { Turn {
+    index, end, left, critical_left, critical_is_new, had_attention, shortage, used_before, parking, ending,
+} }

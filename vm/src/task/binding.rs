@@ -11,6 +11,7 @@
 use super::copy_with_room;
 use crate::names::GivenMap;
 use crate::value::Value;
+use esl_heap::stored;
 
 /// Number of bindings searched one by one; at most twice as many.
 const NEAR: usize = 32;
@@ -226,6 +227,10 @@ impl Bindings {
         }
     }
 }
+
+stored! { Binding { symbol, value, base } }
+stored! { BindingTable { newest, previous } }
+stored! { Bindings { all, table } }
 
 #[cfg(test)]
 mod tests {

@@ -218,7 +218,7 @@ impl Clone for Control {
 
 /// Control stack that is made when it is first used: many tasks never use one.
 #[derive(Clone, Default)]
-pub(crate) struct LazyControl(OnceCell<Box<Control>>);
+pub(crate) struct LazyControl(pub(super) OnceCell<Box<Control>>);
 
 /// Room for entries or bindings that is given back when it is not used.
 const MANY: usize = 1 << 14;

@@ -1,5 +1,6 @@
 //! The report of the failure that has ended a task.
 
+use esl_heap::stored;
 use std::sync::Arc;
 
 use esl_heap::list_state;
@@ -57,3 +58,5 @@ impl FailureReport {
         }
     }
 }
+
+stored! { FailureReport { story, full, ending, detailed, frames } }

@@ -1,6 +1,7 @@
 //! Numbers by which tasks, their states and their limits are told apart.
 
 use esl_heap::list_state;
+use esl_heap::stored;
 use std::fmt;
 
 /// Index of a task in the table of tasks. Used again after the task's end.
@@ -56,3 +57,8 @@ impl Serial {
 /// Number of a limit, unique in the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct LimitNumber(pub(crate) Serial);
+
+stored! { TaskIndex { 0 } }
+stored! { TaskNumber { 0 } }
+stored! { Serial { 0 } }
+stored! { LimitNumber { 0 } }

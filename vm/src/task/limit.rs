@@ -3,6 +3,7 @@
 use super::LimitNumber;
 use crate::value::Value;
 use esl_heap::list_state;
+use esl_heap::stored;
 
 /// Names an account of ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,6 +157,11 @@ impl Fund {
         Some(Allowance::after(now, ticks, ticks * LAST_TIME_PER_TICK))
     }
 }
+
+stored! { AccountId { 0 } }
+stored! { Limit { entry, number, account, outer, ends, expired } }
+stored! { Allowance { ticks, time } }
+stored! { Fund { depth, ends, floor, is_reported } }
 
 #[cfg(test)]
 mod tests {

@@ -15,6 +15,7 @@ pub(crate) mod guard;
 mod id;
 mod limit;
 mod standstill;
+mod stored;
 mod tasks;
 
 pub(crate) use binding::{Binding, Bindings};
@@ -33,6 +34,7 @@ use crate::heap::{Heap, Holder};
 use crate::saved_pc::SavedPc;
 use crate::stack::Stack;
 use crate::value::Value;
+use esl_heap::{stored, stored_enum};
 
 /// State of a task with regard to running.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -421,6 +423,15 @@ pub(crate) const HIGHEST_PRIORITY: u8 = PRIORITIES as u8 - 1;
 pub(crate) const PRIORITIES: usize = 8;
 
 const _: () = assert!(size_of::<Task>() <= 120, "there may be a million tasks");
+
+stored_enum! { TaskState { Runnable = 0, Waiting = 1, Reading = 2, Writing = 3, Ended = 4 } }
+stored_enum! { Shortage { None = 0, Noted = 1, Collected = 2 } }
+stored! { Flags { 0 } }
+stored! { Extra { report, end, values, limits, fund, interrupts } }
+stored! { Task {
+    object, number, wait, control, extra, flags, state, priority, critical, has_deadline, stack, pc, notify, ticks,
+    serial, scanned, base, turns, account, counted,
+} }
 
 #[cfg(test)]
 mod tests {

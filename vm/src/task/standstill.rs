@@ -8,6 +8,7 @@
 
 use esl_heap::list_state;
 use esl_heap::state::{StateSink, Stated};
+use esl_heap::{stored, stored_enum};
 
 use crate::value::Value;
 
@@ -87,3 +88,6 @@ impl Standstill {
         std::mem::replace(&mut self.by, Value::NIL)
     }
 }
+
+stored_enum! { Rest { None = 0, Rests = 1, Woken = 2 } }
+stored! { Standstill { behind, stopped, by, times } }

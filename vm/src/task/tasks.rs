@@ -1,6 +1,7 @@
 //! The table of a machine's tasks.
 
 use esl_heap::list_state;
+use esl_heap::stored;
 
 use super::{Extra, Rest, Standstill, Task, TaskIndex};
 use crate::heap::{Heap, Holder};
@@ -307,6 +308,10 @@ impl Tasks {
         self.unmet += 1;
     }
 }
+
+stored! { TaskId { index, generation } }
+stored! { TaskPlace { task, generation, taken, rest } }
+stored! { Tasks { places, standstills, free, spare, unmet, discarded } }
 
 #[cfg(test)]
 mod tests {

@@ -5,6 +5,7 @@
 //! and operations on waits try again.
 
 use esl_heap::list_state;
+use esl_heap::stored;
 use std::collections::VecDeque;
 
 use crate::task::{AccountId, Serial, TaskIndex, TaskNumber};
@@ -67,3 +68,6 @@ impl Deliveries {
         }
     }
 }
+
+stored! { Delivery { event, arguments, next, account, by } }
+stored! { Deliveries { signals, held } }

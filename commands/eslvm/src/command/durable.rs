@@ -13,13 +13,13 @@ use esl_command::{
 };
 use esl_compiler::diagnostic::{Format, Renderer, Sources};
 use esl_durable::{
-    Downtime, Durability, DurableError, DurableOptions, DurableRun, DurableState, Resumed, UpgradeReport,
-    look,
+    Downtime, Durability, DurableError, DurableOptions, DurableRun, DurableState, Resumed, SnapshotEvery,
+    UpgradeReport, look,
 };
 use esl_replay::RunSetup;
 use esl_vm::vm::Tier;
 
-use super::figures::print_stats;
+use super::figures::{print_snapshots, print_stats};
 use super::options::{ClockChoice, LibraryOption, MachineOptions};
 use super::program::{complain_of_signal, program_with_sources};
 use super::run::RunReports;
@@ -45,10 +45,28 @@ pub(crate) struct StateOptions {
     /// Pause a durable run at SIGTERM, so that the same command goes on, or end it with its cleanups
     #[arg(long, value_enum, default_value = "pause", requires = "state", value_name = "ACTION")]
     pub(crate) on_term: OnTerm,
+    /// Store the machine after so much time or journal, such as 60s or 64M, so that the next process need not
+    /// repeat all before; `never` for not at all. Without this, once a minute in which much has happened
+    #[arg(long, value_name = "WHEN", requires = "state", value_parser = snapshot_every)]
+    pub(crate) snapshot_every: Option<SnapshotEvery>,
     /// Make the changed definitions of the program in the durable run, before it goes on, if its program is
     /// another one
     #[arg(long, requires = "state")]
     pub(crate) upgrade: bool,
+}
+
+/// Reads a time with its unit, a size of the journal, or `never`.
+fn snapshot_every(text: &str) -> Result<SnapshotEvery, &'static str> {
+    if text == "never" {
+        return Ok(SnapshotEvery::Never);
+    }
+    if let Ok(time) = humantime::parse_duration(text) {
+        return Ok(SnapshotEvery::Time(time));
+    }
+    match esl::size::parse_size(text) {
+        Ok(bytes) => Ok(SnapshotEvery::Bytes(bytes as u64)),
+        Err(_) => Err("expected a time such as `60s`, a size of the journal such as `64M`, or `never`"),
+    }
 }
 
 /// The events that a durable run survives.
@@ -143,7 +161,11 @@ pub(crate) fn run_durable(
         DurabilityChoice::Process => Durability::Process,
         DurabilityChoice::Power => Durability::Power,
     };
-    let mut run = DurableRun::open(folder, DurableOptions { durability, downtime }).map_err(refuse)?;
+    let snapshots = state.snapshot_every.unwrap_or_default();
+    let mut run =
+        DurableRun::open(folder, DurableOptions { durability, downtime, snapshots }).map_err(refuse)?;
+    run.warnings().iter().for_each(complain);
+    run.control().on_warning(|text| complain(text));
     let (signals, control) = (SignalTarget::default(), run.control());
     let pauses = state.on_term == OnTerm::Pause;
     end_on_signal_unless(signals.clone(), move |signal| {
@@ -165,7 +187,7 @@ pub(crate) fn run_durable(
         USAGE
     };
     let host = run.host(host.with_elapsed(run.elapsed()));
-    let mut machine = program::machine(options.config(), Box::new(host)).map_err(setup)?;
+    let mut machine = program::machine(run.config(options.config()), Box::new(host)).map_err(setup)?;
     // That part of the library makes upgrades.
     program::load_operators(&mut machine).map_err(setup)?;
     if !is_virtual {
@@ -198,7 +220,11 @@ pub(crate) fn run_durable(
     let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let managed = tell_manager(&machine, &name)?;
     let started = std::time::Instant::now();
-    let main = program::begin(&mut machine, &program).map_err(setup)?;
+    let main = match run.restore(&mut machine).map_err(refuse)? {
+        Some(main) => main,
+        None => program::begin(&mut machine, &program).map_err(setup)?,
+    };
+    run.take_snapshots(&mut machine);
     let outcome = machine.run(u64::MAX);
     run.check().map_err(refuse)?;
     if run.control().begin_end() {
@@ -224,6 +250,7 @@ pub(crate) fn run_durable(
     }
     if reports.stats.is_some() {
         print_stats(&machine, &summary, started.elapsed().as_secs_f64());
+        print_snapshots(run.snapshot_figures());
     }
     // The process ends here: giving the memory back piece by piece would only take time.
     std::mem::forget(machine);
@@ -387,6 +414,14 @@ fn print_state(state: &mut DurableState) {
         state.bytes,
         if state.torn > 0 { format!(", and {} bytes that are cut off", state.torn) } else { String::new() }
     );
+    if state.generation > 0 {
+        let from = match state.base {
+            0 => "goes on from its beginning".into(),
+            base => format!("goes on from snapshot {base}, {} bytes", state.snapshot_bytes),
+        };
+        say!("generations: {} to {}; {from}", state.oldest, state.generation);
+    }
+    state.warnings.iter().for_each(|warning| say!("warning: {warning}"));
     if let Some(written) = state.written {
         let since = SystemTime::now().duration_since(written).unwrap_or(Duration::ZERO);
         let since = humantime::format_duration(Duration::from_secs(since.as_secs()));

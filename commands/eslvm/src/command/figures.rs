@@ -2,6 +2,7 @@
 
 use esl::program::Summary;
 use esl_command::say_error;
+use esl_durable::SnapshotFigures;
 use esl_vm::vm::{Tier, Vm};
 
 use crate::profile::{Profile, ProfiledFunction, UsedResources};
@@ -36,6 +37,12 @@ pub(crate) fn print_stats(machine: &Vm, summary: &Summary, seconds: f64) {
             }
         }
     }
+}
+
+/// Prints figures of the snapshots of a durable run.
+pub(crate) fn print_snapshots(figures: SnapshotFigures) {
+    say_error!("snapshots     {:>14}", figures.taken);
+    say_error!("  longest     {:>14.3} ms", figures.longest.as_secs_f64() * 1e3);
 }
 
 /// Prints the functions that have used most ticks.

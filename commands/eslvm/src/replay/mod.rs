@@ -9,7 +9,9 @@ use std::str::FromStr;
 use clap::Args;
 use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain, refuse_overwriting, say};
 use esl_host::{Host, Output, ReplayHost};
-use esl_replay::{Breakpoint, Recorded, RecordedError, Replayed, Rerun, RerunError, Target};
+use esl_replay::{
+    Breakpoint, RecordedError, ReplayError, Replayed, Rerun, RerunError, Target, read_recorded,
+};
 use esl_timeline::Timeline;
 
 use crate::mcap::McapRecording;
@@ -45,12 +47,20 @@ pub struct ReplayOptions {
 /// The exit status, after a message, if there is nothing to replay.
 pub fn run(options: &ReplayOptions) -> Result<u8, u8> {
     let file = &options.file;
-    let bytes = std::fs::read(file).map_err(|error| {
-        complain(format_args!("{} cannot be read: {error}", file.display()));
-        USAGE
+    let recorded = read_recorded(file).map_err(|error| match error {
+        ReplayError::Recording(error) => refused(file, &RerunError::Recording(error)),
+        error => {
+            complain(format_args!("{} cannot be read: {error}", file.display()));
+            USAGE
+        }
     })?;
-    let recorded = Recorded::read(&bytes).map_err(|error| refused(file, &RerunError::Recording(error)))?;
     if options.until.is_some() || !options.breakpoints.is_empty() {
+        if recorded.start.is_some() {
+            complain(
+                "a journal that begins at a snapshot is replayed as a whole: leave out `--until` and `--break`",
+            );
+            return Err(USAGE);
+        }
         return session::run(recorded, options.until.clone(), options.breakpoints.clone())
             .map_err(|error| refused(file, &error));
     }

@@ -116,6 +116,63 @@ fn a_run_that_is_killed_goes_on() {
     assert!(errors.contains("has ended with status 7"), "{errors}");
 }
 
+/// Returns the names of the snapshots of an agent, oldest first.
+#[cfg(target_os = "linux")]
+fn snapshots(agent: &Agent) -> Vec<std::path::PathBuf> {
+    let entries = std::fs::read_dir(agent.folder.path().join("state")).expect("it is there");
+    let paths = entries.map(|entry| entry.expect("it can be read").path());
+    let mut found: Vec<_> =
+        paths.filter(|path| path.extension().is_some_and(|extension| extension == "esls")).collect();
+    found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
+    found
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_run_goes_on_from_a_snapshot_or_from_the_one_before() {
+    let agent = Agent::new("durable-snapshots", AGENT);
+    for line in ["count 2", "count 4"] {
+        let mut running = agent.start(&["--snapshot-every", "1ms"]);
+        running.wait_for(line);
+        // Another thread writes it.
+        while snapshots(&agent).is_empty() {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        running.send("-KILL");
+        running.end();
+        let (status, output, errors) = agent.state(&[]);
+        assert_eq!(status, Some(0), "{errors}");
+        assert!(output.contains("; goes on from snapshot "), "{output}");
+        assert!((1..=3).contains(&snapshots(&agent).len()), "{:?}", snapshots(&agent));
+    }
+    let newest = snapshots(&agent).pop().expect("there is a snapshot");
+    let mut bytes = std::fs::read(&newest).expect("it is there");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    std::fs::write(&newest, bytes).expect("it can be written");
+    let (status, output, errors) = agent.run(&["--snapshot-every", "never"]);
+    assert_eq!(status, Some(7), "{output}{errors}");
+    assert!(errors.contains(" is left out: it is damaged at byte 0"), "{errors}");
+    assert_eq!(output.lines().last(), Some("over 5"), "{output}");
+    assert!(!output.contains("count 2"), "{output}");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_paused_run_goes_on_from_a_snapshot() {
+    let agent = Agent::new("durable-snapshot-pause", AGENT);
+    let mut running = agent.start(&["--snapshot-every", "1h"]);
+    running.wait_for("count 3");
+    running.send("-TERM");
+    let (status, errors) = running.end();
+    assert!(status == Some(0) && errors.contains("paused; the same command goes on"), "{errors}");
+    assert_eq!(snapshots(&agent).len(), 1);
+    let (status, output, errors) = agent.run(&[]);
+    assert_eq!(status, Some(7), "{output}{errors}");
+    assert_eq!(output.lines().last(), Some("over 5"), "{output}");
+    assert!(!output.contains("count 3"), "{output}");
+}
+
 #[test]
 fn sigterm_pauses_or_ends_a_run() {
     let agent = Agent::new("durable-paused", AGENT);

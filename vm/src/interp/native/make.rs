@@ -302,3 +302,19 @@ pub(super) unsafe fn uninstall(compiled: &mut CompiledFunctions, code: *mut Code
 fn unused(made: &MachineCode) -> Box<[LoopUse]> {
     vec![LoopUse::default(); made.loops().len()].into()
 }
+
+impl CompiledFunctions {
+    /// Lets calls of all installed code lead to its first instruction, or to the machine code again: entries
+    /// mean nothing in another process. Between the two, nothing runs.
+    pub(crate) fn lead_to_interpreter(&mut self, leads: bool) {
+        for installed in self.installed.iter().flatten() {
+            // SAFETY: code that has machine code installed is alive: else its machine code is given back when
+            // the collector has found that.
+            unsafe {
+                let code = Value::from_bits(installed.order.code).object_ptr().cast::<CodeObject>();
+                (*code).entry =
+                    if leads { first_instruction(code) } else { (&raw const *installed.stub).cast() };
+            }
+        }
+    }
+}

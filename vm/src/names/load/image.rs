@@ -16,6 +16,7 @@ use esl_bytecode::file::{ConstantRecord, ModuleImage, SymbolHome};
 use esl_bytecode::module::{FunctionNumber, ModuleFunction, PoolIdx, VariablePlace};
 use esl_bytecode::symbol::{Symbol, symbol_of_setf_cell};
 use esl_heap::state::{StateSink, Stated};
+use esl_heap::store::{Stored, StoredBytes};
 
 use super::definitions::{Definitions, ImageDefinition, name_of};
 use super::{LoadError, LoadedFunction, character, data, debug, integer, make_code, own_constants, ratio};
@@ -58,6 +59,30 @@ impl Images {
     /// Returns the names of the images.
     pub(crate) fn names(&self) -> impl Iterator<Item = &'static str> {
         self.0.iter().map(|image| image.name)
+    }
+
+    /// Adds the objects made of the images to `out`, with the names of these.
+    pub(crate) fn store(&self, out: &mut Vec<u8>) {
+        let rows = self
+            .0
+            .iter()
+            .map(|image| (image.name.to_owned(), [image.symbols, image.pool, image.functions, image.lazy]));
+        rows.collect::<Vec<(String, [Value; 4])>>().store(out);
+    }
+
+    /// Takes the objects made of the same images over; `None` if they are others, or the bytes end before.
+    pub(crate) fn load(&mut self, from: &mut StoredBytes<'_>) -> Option<()> {
+        let rows: Vec<(String, [Value; 4])> = Stored::load(from)?;
+        if rows.len() != self.0.len() {
+            return None;
+        }
+        for (image, (name, objects)) in self.0.iter_mut().zip(rows) {
+            if image.name != name {
+                return None;
+            }
+            [image.symbols, image.pool, image.functions, image.lazy] = objects;
+        }
+        Some(())
     }
 
     /// Calls `visit` with every object made of the images.

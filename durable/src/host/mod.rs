@@ -8,21 +8,25 @@
 //! the intent of the effect. A call that may not be made twice is made once, or fails with
 //! `:interrupted-by-restart`.
 
+mod effects;
+
 use std::collections::{BTreeMap, HashSet};
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_host::{
-    ActionId, Awaited, CallEffect, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, Inbox,
-    Incoming, Input, Intent, News, NotedRecord, Output, Permit, ProcessSignal, QuestionHash, Recorder,
-    RecordingHost, ReplayHost, Right, Rights, RunCheck, Wake, WriteMode, has_gone_object,
+    ActionId, Awaited, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, Inbox, Incoming,
+    Input, News, NotedRecord, Output, Permit, ProcessSignal, QuestionHash, Recorder, RecordingHost,
+    ReplayHost, Right, Rights, RunCheck, Wake, WriteMode, has_gone_object,
 };
+
+use esl_replay::JournalGeneration;
 
 use super::control::{DurableControl, Resumed};
 use super::error::DurableError;
 use super::file_effect::{FileSize, complete_deletion, complete_request, complete_write, size_of};
 use super::interruption::{
-    after_restart, ended_operations, interrupted, last_question, refused, refused_call, senders,
+    after_restart, ended_operations, interrupted, last_question, news_of, open_call, refused, senders,
 };
 use super::log::JournalLog;
 use super::resume::Resumption;
@@ -62,16 +66,24 @@ impl<H: Host> DurableHost<H> {
         log: JournalLog,
         control: DurableControl,
         records: std::sync::Arc<[NotedRecord]>,
+        start: Option<&JournalGeneration>,
         resumption: Option<Resumption>,
         upgrade: Option<Upgrade>,
     ) -> DurableHost<H> {
         let inbox = host.inbox();
         control.set_inbox(inbox.clone());
         let ended = ended_operations(&records);
-        let lost = senders(&records);
-        let asked = last_question(&records);
+        let lost = senders(&records, start.map_or(0, |start| start.senders as usize));
+        let asked = last_question(&records, start.map_or(0, |start| start.asked));
         let early = (0..lost).map(|_| Incoming::SenderLeft).collect();
-        let past = ReplayHost::new(records).with_screen(|_, _| ()).with_inbox(inbox.clone());
+        let open = start.map_or(&[][..], |start| &start.open).iter();
+        let open = open.filter(|call| !ended.contains(&call.number)).map(|call| (call.number, news_of(call)));
+        let open = open.collect();
+        let past = match start {
+            Some(_) => ReplayHost::preparing(records),
+            None => ReplayHost::new(records),
+        };
+        let past = past.with_screen(|_, _| ()).with_inbox(inbox.clone());
         control.set_past(past.clone());
         let live = RecordingHost::with_recorder(host, log.clone());
         DurableHost {
@@ -83,7 +95,7 @@ impl<H: Host> DurableHost<H> {
             resumption,
             early,
             ended,
-            open: BTreeMap::new(),
+            open,
             interrupts: false,
             lost,
             asked,
@@ -94,7 +106,8 @@ impl<H: Host> DurableHost<H> {
 
     /// Returns whether no record answers the next question. The replay of a run that has diverged never ends.
     fn is_live(&self) -> bool {
-        self.resumption.is_none() || (self.past.is_at_end() && !self.past.has_diverged())
+        self.resumption.is_none()
+            || (self.past.is_at_end() && !self.past.has_diverged() && !self.past.is_preparing())
     }
 
     /// Goes on with the outside, if no record answers the next question. Returns whether none does.
@@ -102,7 +115,10 @@ impl<H: Host> DurableHost<H> {
         if !self.is_live() {
             return false;
         }
-        let Some(resumption) = self.resumption.take() else { return true };
+        let Some(resumption) = self.resumption.take() else {
+            self.note_standing();
+            return true;
+        };
         self.live.go_on(self.past.not_due());
         let (life, downtime) = resumption.begin(self.live.host_mut().monotonic());
         self.log.note_life(life);
@@ -122,11 +138,18 @@ impl<H: Host> DurableHost<H> {
                 first.push(Incoming::Operation { number, news });
             }
         }
+        self.log.forget_ended(&self.ended);
         self.control.note_resumed(Resumed { life, downtime, interrupted, lost: self.lost });
         first.append(&mut self.early);
         self.early = first;
         self.inbox.ring();
         true
+    }
+
+    /// Notes where the run stands, for a snapshot.
+    fn note_standing(&self) {
+        let is_settled = self.early.is_empty() && self.upgrade.is_none() && self.upgrading.is_none();
+        self.control.note_standing(is_settled, self.live.not_due());
     }
 
     /// Asks the machine for an upgrade. Returns the arrivals by which it is asked.
@@ -162,71 +185,6 @@ impl<H: Host> DurableHost<H> {
         if self.past.is_at_end() {
             self.inbox.ring();
         }
-    }
-
-    /// Notes that an effect is about to leave, and makes all safe before it. Returns its identity; `None` if
-    /// it may not leave.
-    fn intend(&mut self, question: QuestionHash, operation: Option<u64>, before: u64) -> Option<ActionId> {
-        let action = self.log.next_action();
-        self.live.note_intent(question, Intent { action, operation, before });
-        self.log.commit().then_some(action)
-    }
-
-    /// Makes a call of a function that returns at once.
-    fn call_outside(
-        &mut self,
-        call: HostCall<'_>,
-        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
-    ) -> Result<Datum, HostFailure> {
-        if has_gone_object(call.arguments) {
-            let answer = match call.effect {
-                CallEffect::Closes => Ok(Datum::nil(Span::default())),
-                _ => Err(interrupted(call, None)),
-            };
-            return self.live.answer_call(call, answer);
-        }
-        match call.effect {
-            CallEffect::Local => return self.live.call(call, function),
-            // The close is an effect on the other end.
-            CallEffect::Closes if !self.log.commit() => return Err(refused_call()),
-            CallEffect::Closes => return self.live.call(call, function),
-            CallEffect::Idempotent | CallEffect::Once => {}
-        }
-        let question = QuestionHash::of_call(call.name, call.arguments);
-        if self.intend(question, None, 0).is_none() {
-            return Err(refused_call());
-        }
-        let answer = self.live.call(call, function);
-        self.log.write();
-        answer
-    }
-
-    /// Begins an operation.
-    fn begin_outside(&mut self, call: HostCall<'_>, function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
-        let number = call.operation.unwrap_or(0);
-        let question = QuestionHash::of_call(call.name, call.arguments);
-        let Some(action) = self.intend(question, call.operation, 0) else {
-            return self.inbox.put(Incoming::Operation { number, news: News::Failed(refused_call()) });
-        };
-        if has_gone_object(call.arguments) {
-            return self.inbox.put(Incoming::Operation { number, news: after_restart(call, None) });
-        }
-        self.live.begin(call, &mut |arguments, _| function(arguments, Some(action)));
-    }
-
-    /// Changes a file by the outside.
-    fn change_file(
-        &mut self,
-        question: QuestionHash,
-        before: FileSize,
-        change: impl FnOnce(&mut RecordingHost<H, JournalLog>) -> Result<(), HostError>,
-    ) -> Result<(), HostError> {
-        if self.intend(question, None, before.0).is_none() {
-            return Err(refused());
-        }
-        let answer = change(&mut self.live);
-        self.log.write();
-        answer
     }
 }
 
@@ -264,7 +222,11 @@ impl<H: Host> Host for DurableHost<H> {
             self.live.answer_not_due();
             return None;
         }
-        ask!(self, host => host.due(deadline))
+        let due = ask!(self, host => host.due(deadline));
+        if due.is_none() && self.is_live() {
+            self.note_standing();
+        }
+        due
     }
 
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
@@ -424,6 +386,7 @@ impl<H: Host> Host for DurableHost<H> {
                 function(call.arguments, Some(intent.action));
             }
             let news = (!is_repeated).then(|| after_restart(call, Some(intent.action)));
+            self.log.note_open(open_call(call, number, intent.action));
             self.open.insert(number, news);
         }
         self.ring_at_end();
@@ -446,7 +409,12 @@ impl<H: Host> Host for DurableHost<H> {
         if self.log.has_failed() {
             return vec![Incoming::Signal(ProcessSignal::Interrupt), Incoming::Stop];
         }
-        let pauses = self.control.takes_pause();
+        let mut pauses = self.control.takes_pause();
+        if pauses && !self.control.may_pause() {
+            // The next round begins with the snapshot.
+            self.inbox.ring();
+            pauses = false;
+        }
         if pauses {
             self.control.note_time(self.live.host_mut().monotonic());
         }
@@ -463,6 +431,7 @@ impl<H: Host> Host for DurableHost<H> {
             if !contents.is_empty() {
                 self.log.write();
             }
+            self.note_standing();
             contents
         } else {
             self.early.extend(self.inbox.take());
