@@ -42,13 +42,13 @@ impl RunFolder {
         check_private(path)?;
         let lock_path = path.join(LOCK);
         let mut options = OpenOptions::new();
-        options.write(true).create(true).truncate(false);
+        options.read(true).write(true).create(true).truncate(false);
         #[cfg(unix)]
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
         let lock =
             options.open(&lock_path).map_err(|error| DurableError::Folder(lock_path.clone(), error))?;
         #[cfg(unix)]
-        wait_for_lock(&lock, path)?;
+        take_lock(&lock, path)?;
         Ok(RunFolder { path: path.into(), _lock: lock })
     }
 
@@ -58,23 +58,42 @@ impl RunFolder {
     }
 }
 
-/// Locks the folder. A fork of a process that was killed just now may have it for a moment still.
+/// Locks the folder, and notes the number of this process in the file. A fork of a process that was killed
+/// just now may have the lock for a moment still.
 #[cfg(unix)]
-fn wait_for_lock(lock: &File, path: &Path) -> Result<(), DurableError> {
+fn take_lock(lock: &File, path: &Path) -> Result<(), DurableError> {
+    use std::os::unix::fs::FileExt;
+
     use rustix::fs::{FlockOperation, flock};
     use rustix::io::Errno;
 
+    let folder_error = |error: std::io::Error| DurableError::Folder(path.join(LOCK), error);
     let begun = std::time::Instant::now();
     loop {
         match flock(lock, FlockOperation::NonBlockingLockExclusive) {
-            Ok(()) => return Ok(()),
-            Err(Errno::WOULDBLOCK) if begun.elapsed() < PATIENCE => {
+            Ok(()) => break,
+            Err(Errno::WOULDBLOCK) if begun.elapsed() < PATIENCE && !is_holder_alive(lock) => {
                 std::thread::sleep(std::time::Duration::from_millis(5));
             }
             Err(Errno::WOULDBLOCK) => return Err(DurableError::InUse(path.into())),
-            Err(error) => return Err(DurableError::Folder(path.join(LOCK), error.into())),
+            Err(error) => return Err(folder_error(error.into())),
         }
     }
+    let number = std::process::id().to_string();
+    lock.write_all_at(number.as_bytes(), 0).map_err(folder_error)?;
+    lock.set_len(number.len() as u64).map_err(folder_error)
+}
+
+/// Returns whether the process is there that has noted its number in the file.
+#[cfg(unix)]
+fn is_holder_alive(lock: &File) -> bool {
+    use std::os::unix::fs::FileExt;
+
+    let mut text = [0; 16];
+    let length = lock.read_at(&mut text, 0).unwrap_or(0);
+    let number = std::str::from_utf8(&text[..length]).ok().and_then(|text| text.parse().ok());
+    let process = number.and_then(rustix::process::Pid::from_raw);
+    process.is_some_and(|process| rustix::process::test_kill_process(process).is_ok())
 }
 
 /// Refuses files of other users, and files that other users may read or write.

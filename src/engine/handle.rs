@@ -182,8 +182,8 @@ impl Handle {
     }
 }
 
-/// An input of a program, as other threads signal it many times: a signal costs about a fifth less than by
-/// [`Handle::signal`], which looks for the name each time.
+/// An input of a program, as other threads signal it many times: [`Handle::signal`] looks for the name each
+/// time.
 ///
 /// ```
 /// use esl::Engine;

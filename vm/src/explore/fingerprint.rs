@@ -458,8 +458,8 @@ impl Walk<'_> {
         self.is_strict || self.vm.scheduler.points.has_counts
     }
 
-    /// Mixes in the count of an event, if that belongs to a state. Its mark is mixed in at the end, if something
-    /// else knows it.
+    /// Mixes in the count of an event, if that belongs to a state. Its mark is mixed in at the end, if
+    /// something else holds it.
     fn count(&mut self, v: Value) {
         if self.has_counts() { self.value(v) } else { self.marks.push(v) }
     }

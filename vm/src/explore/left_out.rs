@@ -48,7 +48,7 @@ impl TickPlace {
     }
 }
 
-/// What the searches so far have shown to be needed.
+/// The points that the searches so far have shown to be needed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NeededPoints {
     /// Ticks after actions.
@@ -57,7 +57,7 @@ pub(super) struct NeededPoints {
     pub(super) variables: HashSet<Symbol>,
 }
 
-/// What runs have shown to be needed beyond that.
+/// The points that runs have shown to be needed beyond these.
 #[derive(Debug, Default)]
 pub(super) struct ShownPoints {
     /// Whether a request to end or to leave a form, or an interrupt, has reached a task that could run.

@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! point         where a task may have to let others go first, and running from point to point
+//! check         conditions that hold in each state
 //! fingerprint   telling states apart           content  visiting the fields that belong to a state
 //! digest        hashes of states               numbers  objects in the order in which they are met
 //! live          which registers of a frame belong to a state
@@ -55,6 +56,7 @@
 //! Source: Musuvathi and Qadeer 2007 for the order by preemptions; state hashes are as old as SPIN (Holzmann
 //! 1988).
 
+mod check;
 mod content;
 mod digest;
 mod fingerprint;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
+use super::check::check_state;
 use super::left_out::{LeftOut, TickPlace};
 use super::step::{
     Runnable, ScheduleEvent, ScheduleStep, TellStep, is_of_library, switch, tell_step, tell_uses,
@@ -163,6 +164,9 @@ pub(super) struct PointRun {
     skipped: u32,
 }
 
+/// Most ticks that are left out one after the other: a task that goes round for ever has to come to a point.
+const MOST_LEFT_OUT: u32 = 200;
+
 /// The way of a task since it last stood at a point.
 #[derive(Clone, Copy, Debug)]
 struct UnseenWay {
@@ -172,9 +176,11 @@ struct UnseenWay {
     ticks: u32,
     /// Ticks after which there is a point in any case.
     most: u32,
+    /// Number of ticks that were left out since the last point.
+    left_out: u32,
     /// The tick after the last action that others can see, if that was left out.
     last_action: Option<TickPlace>,
-    /// What was written and called outside when that was left out.
+    /// The output and the calls of the outside when that was left out, see [`outside`].
     outside: (u64, u64),
 }
 
@@ -206,6 +212,7 @@ impl PointRun {
                 watched: 0,
                 ticks: 0,
                 most: settings.turn,
+                left_out: 0,
                 last_action: None,
                 outside: (0, 0),
             }),
@@ -319,8 +326,8 @@ impl PointRun {
         }
     }
 
-    /// Returns whether the task that ran last has done something that others can see since its last point, which
-    /// matters where it chooses a way: there, no other task may go.
+    /// Returns whether the task that ran last has done something that others can see since its last point.
+    /// That matters where it chooses a way: there, no other task may go.
     pub(super) fn has_open_action(&self, vm: &Vm) -> bool {
         let points = &vm.scheduler.points;
         let is_open = |way: &UnseenWay| way.last_action.is_some() || points.has_shown;
@@ -338,7 +345,7 @@ impl PointRun {
             vm.scheduler.points.raced = left_out.as_ref().map(|left_out| Arc::new(left_out.raced(vm)));
         }
         if vm.scheduler.points.asked.is_some() {
-            // No other task may go here, so this is no end of the way.
+            // No other task may go here, so the way of this one goes on.
             return None;
         }
         let (last_action, is_sudden) = (way.last_action.take(), way.is_sudden(vm));
@@ -352,7 +359,8 @@ impl PointRun {
             left_out.shown.requests |= was_hit;
             left_out.shown.places.extend(last_action.filter(|_| is_sudden));
         }
-        if has_shown && left_out.is_none() || ticks >= way.most {
+        let was_left_out = std::mem::take(&mut way.left_out);
+        if ticks >= way.most {
             return None;
         }
         let (_, index) = runnable_tasks(vm).find(|&(number, _)| number == self.last)?;
@@ -360,23 +368,22 @@ impl PointRun {
         // An abort cuts off the rest of the task, of which others may see each part.
         let depends_on_place =
             vm.scheduler.points.has_guards || task.control.get().is_some_and(depends_on_place);
-        let is_left_out = match left_out {
-            None if depends_on_place => return None,
-            None => false,
+        let may_matter = has_shown || depends_on_place;
+        if may_matter && (left_out.is_none() || was_left_out >= MOST_LEFT_OUT) {
+            return None;
+        }
+        match left_out {
             Some(left_out) if is_seen => {
                 let place = TickPlace::of(vm, index);
                 if left_out.needed.places.contains(&place) {
                     return None;
                 }
                 (way.last_action, way.outside) = (Some(place), outside(vm));
-                true
             }
-            Some(_) => {
-                way.last_action = last_action;
-                has_shown || depends_on_place
-            }
-        };
-        if !is_left_out {
+            _ => way.last_action = last_action,
+        }
+        way.left_out = was_left_out + u32::from(may_matter);
+        if !may_matter {
             way.ticks = ticks;
         } else if runnable_tasks(vm).count() > 1 || self.has_timers && time_may_pass(vm) {
             self.skipped += 1;
@@ -437,7 +444,7 @@ fn time_may_pass(vm: &mut Vm) -> bool {
 }
 
 /// Returns the numbers and places of the tasks that can run.
-fn runnable_tasks(vm: &Vm) -> impl Iterator<Item = (TaskNumber, TaskIndex)> + '_ {
+pub(super) fn runnable_tasks(vm: &Vm) -> impl Iterator<Item = (TaskNumber, TaskIndex)> + '_ {
     let ids = vm.scheduler.tasks.ids().into_iter();
     ids.filter_map(|id| {
         let task = vm.scheduler.tasks.get(id).filter(|task| task.state == TaskState::Runnable)?;
@@ -454,42 +461,4 @@ pub(super) fn living_tasks(vm: &Vm) -> (SmallVec<[TaskNumber; 16]>, u64) {
     let able = tasks.iter().take(63).enumerate().filter(|(_, (_, is_able))| *is_able);
     let able = able.fold(0, |able, (rank, _)| able | 1 << rank);
     (tasks.into_iter().map(|(number, _)| number).collect(), able)
-}
-
-/// Most turns of a task that checks what always has to hold, in one state.
-const CHECK_TURNS: u32 = 1_000;
-
-/// Ticks of such a turn.
-const CHECK_SLICE: u32 = 100_000;
-
-/// Lets the task run that checks what always has to hold, if the program has one (`stdlib/exploration.esl`):
-/// until it waits for the event in the variable `checks`, where it stands at first, and then from each signal
-/// of that event until it waits again. It stops at no points, so that it adds no states. Returns whether its
-/// turns were enough.
-fn check_state(vm: &mut Vm, checks: Value) -> bool {
-    let awaited = vm.heap.symbol(checks).map_or(Value::NIL, |symbol| symbol.value);
-    if awaited == Value::NIL || awaited == Value::UNBOUND || vm.outside.exit_status.is_some() {
-        return true;
-    }
-    let object = |vm: &Vm, index| vm.scheduler.tasks.at(index).map_or(Value::NIL, |task| task.object);
-    let before: Vec<TaskIndex> =
-        runnable_tasks(vm).map(|(_, index)| index).filter(|&index| object(vm, index) != awaited).collect();
-    // It has not begun yet, or there is an event; without room for a signal, the next state is checked.
-    if !vm.heap.is(awaited, Kind::Task) && run::signal(vm, awaited, Value::NIL).is_err() {
-        return true;
-    }
-    while !vm.scheduler.deliveries.is_empty() {
-        run::deliver_some(vm);
-    }
-    let grain = vm.scheduler.points.grain.take();
-    let slice = std::mem::replace(&mut vm.config.slice, CHECK_SLICE);
-    let mut turns = 0;
-    while turns < CHECK_TURNS {
-        let woken = runnable_tasks(vm).map(|(_, index)| index).find(|index| !before.contains(index));
-        let Some(index) = woken else { break };
-        run::give_turn(vm, index, u64::MAX);
-        turns += 1;
-    }
-    (vm.scheduler.points.grain, vm.config.slice) = (grain, slice);
-    turns < CHECK_TURNS
 }

@@ -60,8 +60,9 @@ static STUBS: [u32; WORDS] = {
     words
 };
 
-/// Where the stubs are in each process, so that the state of a task means the same in all of them.
-const PLACE: usize = 0x0ffe_0000_0000;
+/// Where the stubs are in each process, so that the state of a task means the same in all of them: below the
+/// end of what ThreadSanitizer takes for addresses of a program, since it stops one that maps others.
+const PLACE: usize = 0x007e_0000_0000;
 
 /// Returns the stubs at their place; `None` if the system does not give it.
 fn placed() -> Option<&'static [u32]> {

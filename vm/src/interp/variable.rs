@@ -5,9 +5,12 @@
 
 use super::{Signal, code_of, constant, failure, word_at};
 use crate::describe::describe;
+use std::collections::HashSet;
+
+use crate::heap::Heap;
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::{Exit, Raised};
-use crate::schedule::{SharedUse, UsedPlace};
+use crate::schedule::{Scheduler, SharedUse, UsedPlace};
 use crate::shape::{CodeKind, Shape};
 use crate::task::{Binding, TaskNumber};
 use crate::value::Value;
@@ -205,4 +208,44 @@ impl Vm {
         bindings.push(Binding { symbol, value, base });
         Ok(())
     }
+}
+
+impl Vm {
+    /// Notes that the running task has read a special variable, which it may have bound, and which has this
+    /// global value. A variable that no task sets beside others looks the same to all, unless its value is an
+    /// object with parts: that may stand for them.
+    #[cold]
+    pub(crate) fn note_variable_read(&mut self, symbol: Value, is_bound: bool, value: Value) {
+        let Vm { scheduler, heap, .. } = self;
+        if scheduler.points.grain.is_none() {
+            return;
+        }
+        let is_alone = scheduler.counts.alive <= 1;
+        let is_constant = |raced: &HashSet<u64>| {
+            is_bound || is_alone || !raced.contains(&symbol.bits()) && is_simple(heap, value)
+        };
+        let is_unseen = scheduler.points.raced.as_deref().is_some_and(is_constant);
+        scheduler.points.note_variable(!is_unseen);
+    }
+
+    /// Notes that the running task has set a special variable, which it may have bound.
+    #[cold]
+    pub(crate) fn note_variable_set(&mut self, symbol: Value, is_bound: bool) {
+        let Scheduler { points, counts, .. } = &mut self.scheduler;
+        if points.grain.is_none() {
+            return;
+        }
+        let is_unseen = points.raced.is_some() && (is_bound || counts.alive <= 1);
+        if !is_unseen && points.raced.as_ref().is_some_and(|raced| !raced.contains(&symbol.bits())) {
+            points.found_raced.push(symbol);
+        }
+        points.note_variable(!is_unseen);
+    }
+}
+
+/// Returns whether a value has no parts that can change.
+fn is_simple(heap: &Heap, value: Value) -> bool {
+    let is_atom =
+        |kind| matches!(kind, Kind::Symbol | Kind::Ratio | Kind::Complex | Kind::Float | Kind::Bignum);
+    !value.is_address() || !value.is_cons() && heap.kind(value).is_some_and(is_atom)
 }

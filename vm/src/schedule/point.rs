@@ -8,11 +8,9 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::{Scheduler, TurnEnd};
-use crate::heap::{Heap, Kind};
 use crate::raise::Exit;
 use crate::task::{TaskEnd, TaskNumber, UnwindTarget, Unwinding};
 use crate::value::Value;
-use crate::vm::Vm;
 
 /// Kinds of operations before which a task stands at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -139,50 +137,10 @@ impl Points {
     }
 
     /// Notes that the running task uses a variable that others may use. Unless `matters`, nobody can see it.
-    fn note_variable(&mut self, matters: bool) {
+    pub(crate) fn note_variable(&mut self, matters: bool) {
         self.has_shown = true;
         (self.is_seen, self.is_sudden) = (self.is_seen | matters, self.is_sudden | matters);
     }
-}
-
-impl Vm {
-    /// Notes that the running task has read a special variable, of which `bound` is the value that it has
-    /// bound, if it has. A variable that no task sets beside others looks the same to all, unless its value is
-    /// an object with parts: that may stand for them.
-    #[cold]
-    pub(crate) fn note_variable_read(&mut self, symbol: Value, is_bound: bool, value: Value) {
-        let Vm { scheduler, heap, .. } = self;
-        if scheduler.points.grain.is_none() {
-            return;
-        }
-        let is_alone = scheduler.counts.alive <= 1;
-        let is_constant = |raced: &HashSet<u64>| {
-            is_bound || is_alone || !raced.contains(&symbol.bits()) && is_simple(heap, value)
-        };
-        let is_unseen = scheduler.points.raced.as_deref().is_some_and(is_constant);
-        scheduler.points.note_variable(!is_unseen);
-    }
-
-    /// Notes that the running task has set a special variable, which it may have bound.
-    #[cold]
-    pub(crate) fn note_variable_set(&mut self, symbol: Value, is_bound: bool) {
-        let Scheduler { points, counts, .. } = &mut self.scheduler;
-        if points.grain.is_none() {
-            return;
-        }
-        let is_unseen = points.raced.is_some() && (is_bound || counts.alive <= 1);
-        if !is_unseen && points.raced.as_ref().is_some_and(|raced| !raced.contains(&symbol.bits())) {
-            points.found_raced.push(symbol);
-        }
-        points.note_variable(!is_unseen);
-    }
-}
-
-/// Returns whether a value has no parts that can change.
-fn is_simple(heap: &Heap, value: Value) -> bool {
-    let is_atom =
-        |kind| matches!(kind, Kind::Symbol | Kind::Ratio | Kind::Complex | Kind::Float | Kind::Bignum);
-    !value.is_address() || !value.is_cons() && heap.kind(value).is_some_and(is_atom)
 }
 
 impl Scheduler {

@@ -311,7 +311,7 @@ impl Tasks {
 
 stored! { TaskId { index, generation } }
 stored! { TaskPlace { task, generation, taken, rest } }
-stored! { Tasks { places, standstills, free, spare, unmet, discarded } }
+stored! { Tasks { places, standstills, free, spare, spare_extra, unmet, discarded } }
 
 #[cfg(test)]
 mod tests {

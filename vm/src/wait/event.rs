@@ -1,9 +1,9 @@
 //! Events: objects of the heap with a count of their signals and a list of the waits for them.
 //!
-//! Who looks at something and then waits for its changes has to know whether an event was signalled meanwhile.
-//! The library does not compare counts for that, but takes a *mark* of the event, which the next signal takes
-//! away: two states of a program that differ by how often something has happened, but not by what is still to
-//! be seen of it, are one state to an exploration.
+//! A task that looks at something and then waits for its changes has to know whether an event was signalled
+//! meanwhile. The library does not compare counts for that, but takes a *mark* of the event, which the next
+//! signal takes away: two states of a program that differ by how often something has happened, but not by
+//! anything that a task can still see of it, are one state to an exploration.
 //!
 //! A task is an event too, which its checkpoints and its end signal; its slots are those of an event and a
 //! few more.
@@ -60,7 +60,7 @@ fn count_in(heap: &Heap, slot: Value) -> i64 {
     slot.as_fixnum().or_else(|| heap.slot_or_nil(slot, 0).as_fixnum()).unwrap_or(0)
 }
 
-/// What [`Kind::Tag`] has as `aux` if it is a mark.
+/// The field `aux` of a [`Kind::Tag`] that is a mark.
 pub(crate) const MARK: u16 = 1;
 
 /// Returns the mark of an event: another object after its next signal.
