@@ -104,8 +104,8 @@ impl Engine {
 
     /// Begins a call of a function of the program, and runs tasks for a portion of ticks, until the call has
     /// ended or all tasks wait. A call that has not ended goes on in the runs to come, as one by
-    /// [`Handle::call`]; it does not count as a sender for which a program waits. Output of
-    /// the program may be left in its buffer: [`Engine::flush`] writes it.
+    /// [`Handle::call`](crate::engine::Handle::call); it does not count as a sender for which a program
+    /// waits. Output of the program may be left in its buffer: [`Engine::flush`] writes it.
     ///
     /// ```
     /// use esl::Engine;

@@ -6,7 +6,7 @@
 //! process, such as the library's image and the functions of the host, are those of the new machine.
 //! Machine code is left out, and made again.
 //!
-//! The structs are taken apart without `..`, as in [`crate::snapshot`]: a new field does not compile until it
+//! The structs are taken apart without `..`, as in `snapshot`: a new field does not compile until it
 //! is stored, or named as one that need not be.
 //!
 //! Guarantees: after [`Vm::load_state`] the machine goes on as the other one did after [`Vm::store_state`],
