@@ -403,7 +403,7 @@ mod tests {
     fn a_snapshot_is_the_same_by_a_fork_and_by_a_copy() {
         let folder = std::env::temp_dir().join(format!("esl-snapshot-{}", std::process::id()));
         std::fs::create_dir(&folder).expect("it is new");
-        let range = range_start(777);
+        let range = range_start(777).expect("the system has 64 bits");
         let config = Config { range: Some(range), memory: 16 << 20, ..Config::DEFAULT };
         let mut machine = Vm::new(config, Box::new(VirtualHost::new())).expect("there is room");
         let state = machine.store_state().expect("nothing is under way");

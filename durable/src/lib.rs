@@ -187,7 +187,7 @@ impl DurableRun {
         options: DurableOptions,
     ) -> Result<DurableRun, DurableError> {
         let control = DurableControl::default();
-        let fresh = (options.snapshots != SnapshotEvery::Never).then(|| range_start(chance()));
+        let fresh = (options.snapshots != SnapshotEvery::Never).then(|| range_start(chance())).flatten();
         let Some(FoundJournals { journal, base, last: number, oldest, snapshot_bytes: _, warnings }) = found
         else {
             let standing = Standing::default();

@@ -146,7 +146,7 @@ fn check(text: &str, name: &str, slice: u32, count: u64, chance: u64) -> Option<
     let run = record(text, name, slice)?;
     let step = (run.rounds / count).max(1);
     let rounds: Vec<u64> = (1..=run.rounds).filter(|round| round % step == chance % step).collect();
-    let range = range_start(chance);
+    let range = range_start(chance).expect("the system has 64 bits");
     let stored = store_at(&run, range, rounds);
     stored.iter().for_each(|at| go_on(&run, range, at, name));
     Some(stored.len())
@@ -169,7 +169,7 @@ fn a_slice_whose_account_is_spent_leaves_nothing_to_the_next() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../conformance/programs");
     let text = std::fs::read_to_string(folder.join(name)).expect("it is there");
     let run = record(&text, name, 1).expect("it ends");
-    let range = range_start(4321);
+    let range = range_start(4321).expect("the system has 64 bits");
     let stored = store_at(&run, range, (1070..1090).collect());
     assert!(stored.len() >= 10, "{}", stored.len());
     stored.iter().for_each(|at| go_on(&run, range, at, name));

@@ -213,11 +213,12 @@ pub fn words_at(start: usize, words: &[u32]) -> Option<&'static [u32]> {
 }
 
 /// Returns where a range may be tried, from a random number: addresses that Linux gives to nothing by itself.
-pub fn range_start(chance: u64) -> usize {
-    const FIRST: usize = 0x1000_0000_0000;
-    const STEP: usize = 1 << 32;
+/// `None` on systems of 32 bits.
+pub fn range_start(chance: u64) -> Option<usize> {
+    const FIRST: u64 = 0x1000_0000_0000;
+    const STEP: u64 = 1 << 32;
     const STEPS: u64 = 0x3000;
-    FIRST + (chance % STEPS) as usize * STEP
+    usize::try_from(FIRST + chance % STEPS * STEP).ok()
 }
 
 #[cfg(all(test, target_os = "linux", target_pointer_width = "64", not(miri)))]

@@ -62,12 +62,12 @@ static STUBS: [u32; WORDS] = {
 
 /// Where the stubs are in each process, so that the state of a task means the same in all of them: below the
 /// end of what ThreadSanitizer takes for addresses of a program, since it stops one that maps others.
-const PLACE: usize = 0x007e_0000_0000;
+const PLACE: u64 = 0x007e_0000_0000;
 
 /// Returns the stubs at their place; `None` if the system does not give it.
 fn placed() -> Option<&'static [u32]> {
     static PLACED: OnceLock<Option<&'static [u32]>> = OnceLock::new();
-    *PLACED.get_or_init(|| esl_heap::heap::words_at(PLACE, &STUBS))
+    *PLACED.get_or_init(|| esl_heap::heap::words_at(usize::try_from(PLACE).ok()?, &STUBS))
 }
 
 /// Returns all stubs.
