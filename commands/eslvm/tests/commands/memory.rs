@@ -16,7 +16,7 @@ use super::{eslvm, most_memory};
 const LIMIT: usize = 24;
 /// Mebibytes that the process may take beside that and what it takes for a program that does nothing: what
 /// the allocator keeps, and tables of the scheduler, which double when they are full.
-const SLACK: usize = 20;
+const SLACK: usize = 26;
 
 /// Longest time that a program may take: a bomb that goes off slowly has been seen for long enough then.
 const PATIENCE: Duration = Duration::from_secs(20);
