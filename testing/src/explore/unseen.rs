@@ -32,6 +32,8 @@ pub enum UnseenKind {
     Variable,
     /// Of a variable of the library, which only grain `ticks` sees.
     LibraryVariable,
+    /// Of a variable whose symbol has no package, which only grain `ticks` sees.
+    UnnamedVariable,
     /// Of a variable that a closure shares with its surroundings.
     Captured,
     /// Of a slot of a structure or an instance.
@@ -62,6 +64,7 @@ impl fmt::Display for UnseenKind {
             UnseenKind::Read => "data that tasks read",
             UnseenKind::Variable => "changes of special variables",
             UnseenKind::LibraryVariable => "changes of variables of the library",
+            UnseenKind::UnnamedVariable => "changes of variables without a package",
             UnseenKind::Captured => "changes of variables of closures",
             UnseenKind::Slot => "changes of slots",
             UnseenKind::Element => "changes of elements of arrays",
@@ -290,6 +293,7 @@ fn kinds_of(module: &Module, function: &ModuleFunction, instr: Instr) -> Vec<Uns
                 Some(symbol) if symbol.is_in(CL_PACKAGE) || symbol.is_in(ESL_PACKAGE) => {
                     UnseenKind::LibraryVariable
                 }
+                Some(symbol) if symbol.package().is_none() => UnseenKind::UnnamedVariable,
                 _ => UnseenKind::Variable,
             }]
         }

@@ -8,8 +8,8 @@
 //!
 //! Which fields of the machine belong to it is said by `state`, and visited in `content`. Not part of a
 //! state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that will not be read
-//! (`live`), where failures began, what is reachable from code only, and the outside. While a query or a
-//! compilation is under way at a point, the state equals no other.
+//! (`live`), where failures began, objects that only code of the library reaches, and the outside. While a
+//! query or a compilation is under way at a point, the state equals no other.
 //!
 //! A *strict* fingerprint is of all that the list calls state of the run: ticks, numbers, the order of
 //! queues, times as they are, all objects in registers, the collector's state, and where objects lie. Two
@@ -393,12 +393,16 @@ impl Walk<'_> {
                 None => {
                     let Some(&object) = vm.heap.symbol(v) else { return };
                     [object.name, object.value, object.plist].into_iter().for_each(|v| self.value(v));
+                    if is_of_program(&vm.heap, object.function) {
+                        self.value(object.function);
+                    }
                 }
             },
             Kind::Function => self.function(v),
             Kind::Code => {
                 let code = self.code(v);
                 self.digest.add_all([code.0, code.1].into_iter());
+                self.constants(v);
             }
             Kind::HashTable => {
                 let Some(table) = Table::of(&vm.heap, v) else { return };
@@ -538,6 +542,32 @@ impl Walk<'_> {
         };
         let captures = heap.function_captures(function).unwrap_or_default();
         self.values(&captures[..captures.len().min(count)]);
+        if is_of_program(heap, function)
+            && let Some(code) = heap.function_code(function)
+        {
+            self.constants(code);
+        }
+    }
+
+    /// Mixes in the constants of a code of the program that can change: symbols of no package, which have
+    /// values, and objects with parts, which a program makes by `load-time-value`.
+    fn constants(&mut self, code: Value) {
+        if self.is_strict {
+            return;
+        }
+        for &v in self.vm.heap.code_constants(code).unwrap_or_default() {
+            let can_change = match self.vm.heap.kind(v) {
+                None => v.is_cons(),
+                Some(Kind::Symbol) => self.symbol(v).is_none(),
+                Some(
+                    Kind::Package | Kind::Class | Kind::Ratio | Kind::Complex | Kind::Float | Kind::Bignum,
+                ) => false,
+                Some(_) => true,
+            };
+            if can_change {
+                self.value(v);
+            }
+        }
     }
 
     /// Returns the digest of the code of a function: for one of the library its number.

@@ -60,8 +60,9 @@ pub(super) struct NeededPoints {
 /// The points that runs have shown to be needed beyond these.
 #[derive(Debug, Default)]
 pub(super) struct ShownPoints {
-    /// Whether a request to end or to leave a form, or an interrupt, has reached a task that could run.
-    pub(super) requests: bool,
+    /// Whether all are needed: a request to end or to leave a form, or an interrupt, has reached a task that
+    /// could run, or a variable in a race has no name.
+    pub(super) needs_all: bool,
     pub(super) places: Vec<TickPlace>,
     pub(super) variables: Vec<Symbol>,
 }
@@ -69,14 +70,14 @@ pub(super) struct ShownPoints {
 impl ShownPoints {
     /// Adds what another run has shown.
     pub(super) fn add(&mut self, other: ShownPoints) {
-        self.requests |= other.requests;
+        self.needs_all |= other.needs_all;
         self.places.extend(other.places);
         self.variables.extend(other.variables);
     }
 
     /// Returns whether nothing was shown.
     pub(super) fn is_nothing(&self) -> bool {
-        !self.requests && self.places.is_empty() && self.variables.is_empty()
+        !self.needs_all && self.places.is_empty() && self.variables.is_empty()
     }
 }
 
@@ -96,9 +97,10 @@ impl<'a> LeftOut<'a> {
     /// Takes from the machine which variables it has found to be in a race.
     pub(super) fn take_variables(&mut self, vm: &mut Vm) {
         for object in std::mem::take(&mut vm.scheduler.points.found_raced) {
-            // A variable without a name in a package counts as one that others cannot reach.
-            if let Some(symbol) = vm.names.name_of(&vm.heap, object) {
-                self.shown.variables.push(symbol);
+            match vm.names.name_of(&vm.heap, object) {
+                Some(symbol) => self.shown.variables.push(symbol),
+                // It has no name by which another machine knows it.
+                None => self.shown.needs_all = true,
             }
         }
     }
@@ -135,7 +137,7 @@ impl Searches {
     /// Takes in what the last search has shown.
     pub(super) fn learn(&mut self, shown: ShownPoints) {
         self.count += 1;
-        if shown.requests || self.count > SEARCHES {
+        if shown.needs_all || self.count > SEARCHES {
             self.settings = self.settings.with_all_points();
         }
         self.needed.places.extend(shown.places);

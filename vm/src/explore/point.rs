@@ -356,7 +356,7 @@ impl PointRun {
         points.is_sudden = false;
         let ticks = std::mem::take(&mut way.ticks) + 1;
         if let Some(left_out) = &mut left_out {
-            left_out.shown.requests |= was_hit;
+            left_out.shown.needs_all |= was_hit;
             left_out.shown.places.extend(last_action.filter(|_| is_sudden));
         }
         let was_left_out = std::mem::take(&mut way.left_out);

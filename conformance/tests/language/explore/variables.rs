@@ -1,8 +1,8 @@
 //! Switches at uses of special variables, which `Grain::Variables` adds: those that matter, and no others.
 
-use esl_testing::explore::Grain;
+use esl_testing::explore::{Grain, grains};
 
-use super::{check, endings, outputs};
+use super::{check, compile, endings, outputs};
 
 /// A variable, and changes of it with a call in between, before which the machine may preempt.
 const SETUP: &str = "(defvar *n* 0) (defun one-more (n) (+ n 1))
@@ -31,6 +31,38 @@ fn a_critical_section_is_one_step_and_a_binding_is_the_tasks_own() {
     check_two(update, update, "*n*", &["2"]);
     let bound = "(let ((*n* 5)) (update) (one-more *n*))";
     check_two(bound, bound, "*n*", &["0"]);
+}
+
+/// Places that only code refers to belong to a state: otherwise two states that differ in one are taken for one.
+#[test]
+fn places_that_only_code_knows_belong_to_a_state() {
+    let programs = [
+        // A variable without a package.
+        "(defmacro with-counter (v)
+           `(progn (defvar ,v 0)
+                   (defun bump () (setq ,v (one-more ,v)))
+                   (defun total () ,v)))
+         (defmacro with-new-counter () `(with-counter ,(gensym)))
+         (with-new-counter)",
+        // A variable of a function without a package.
+        "(defmacro with-function (f)
+           `(progn (let ((n 0)) (defun ,f (adds) (if adds (setq n (one-more n)) n)))
+                   (defun bump () (,f t))
+                   (defun total () (,f nil))))
+         (defmacro with-new-function () `(with-function ,(gensym)))
+         (with-new-function)",
+        // An object that a form has made once.
+        "(defun place () (load-time-value (list 0)))
+         (defun bump () (setf (car (place)) (one-more (car (place)))))
+         (defun total () (car (place)))",
+    ];
+    for program in programs {
+        let text = format!(
+            "(defun one-more (n) (+ n 1)) {program} (task-net (one (bump)) (two (bump))) (princ (total))"
+        );
+        check(&text, Grain::Ticks, &["1", "2"]);
+        assert_eq!(grains(&compile(&text), None).last(), Some(&Grain::Ticks), "{text}");
+    }
 }
 
 #[test]
