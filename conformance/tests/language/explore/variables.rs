@@ -33,7 +33,7 @@ fn a_critical_section_is_one_step_and_a_binding_is_the_tasks_own() {
     check_two(bound, bound, "*n*", &["0"]);
 }
 
-/// Places that only code refers to belong to a state: otherwise two states that differ in one are taken for one.
+/// Places that only code refers to belong to a state: two states that differ in one are not the same.
 #[test]
 fn places_that_only_code_knows_belong_to_a_state() {
     let programs = [
