@@ -58,3 +58,12 @@ fn a_robot_passes_the_door() {
     assert_eq!(run.status, Some(0), "{}{}", run.output, run.errors);
     assert!(run.output.ends_with("2 passed, 0 failed\n"), "{}", run.output);
 }
+
+/// A call that fails, never answers, or ends with its task leaves nothing on, and nothing waits for ever.
+#[test]
+fn faults_leave_no_mission_in_a_bad_state() {
+    for name in ["cross-door", "drive-to-target", "pick-and-place", "safe-drive"] {
+        let run = process::run(eslvm(&["test", "--inject"]).arg(mission(&format!("{name}.esl"))), "");
+        assert_eq!(run.status, Some(0), "{name}: {}{}", run.output, run.errors);
+    }
+}
