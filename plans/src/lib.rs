@@ -40,6 +40,11 @@ pub const MODULES: &[HostModule] = &[
         rows: HostRows::new,
     },
     HostModule {
+        name: "plans-picture",
+        text: include_str!("../modules/plans-picture.esl"),
+        rows: HostRows::new,
+    },
+    HostModule {
         name: "plans-planners",
         text: include_str!("../modules/plans-planners.esl"),
         rows: planner_rows,

@@ -37,6 +37,11 @@ pub const MODULES: &[HostModule] = &[
         rows: HostRows::new,
     },
     HostModule {
+        name: "fleet-picture",
+        text: include_str!("../modules/fleet-picture.esl"),
+        rows: HostRows::new,
+    },
+    HostModule {
         name: "fleet-requests",
         text: include_str!("../modules/fleet-requests.esl"),
         rows: HostRows::new,

@@ -8,6 +8,7 @@
 //! not read its events is disconnected.
 
 mod model;
+mod pictures;
 mod request;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,6 +34,7 @@ use super::refusal::OperatorRefusal;
 use super::scope::RunScope;
 use super::secrets::{OperatorRole, Secrets};
 use model::{RunModel, ViewerView};
+use pictures::PictureBook;
 use request::{Admitted, MonitorCommand, MonitorRequest, admit, parse};
 
 /// The page; `NONCE` stands for what its script and its style are marked with.
@@ -56,6 +58,7 @@ struct MonitorState {
     scheme: &'static str,
     model: Mutex<RunModel>,
     views: Mutex<BTreeMap<String, ViewerView>>,
+    pictures: PictureBook,
     /// Notified when a viewer comes.
     coming: Notify,
     /// Changes with each survey.
@@ -108,6 +111,7 @@ pub(super) fn serve(
         scheme: if is_secured { "https://" } else { "http://" },
         model: Mutex::default(),
         views: Mutex::default(),
+        pictures: PictureBook::default(),
         coming: Notify::new(),
         updates: watch::Sender::new(0),
         program,
@@ -306,10 +310,13 @@ async fn message(watching: &Watching, role: OperatorRole, asks_more: bool) -> Op
     };
     let needs_more = asks_more && (view.task.is_some() || !view.relation.is_empty());
     let more = if needs_more { monitor.scope.survey(request).await } else { None };
-    let (mut message, latest) = {
+    let (mut message, latest, is_paused) = {
         let model = lock(&monitor.model);
-        (model.message(&view), model.latest_failure())
+        (model.message(&view), model.latest_failure(), model.is_paused())
     };
+    if asks_more && view.has_pictures && !is_paused {
+        message["pictures"] = monitor.pictures.latest(&monitor.scope.sender()).await;
+    }
     if let Some(view) = lock(&monitor.views).get_mut(viewer).filter(|view| view.coming == *coming) {
         view.failure = latest;
     }

@@ -31,6 +31,8 @@ pub(super) struct ViewerView {
     /// Relation whose facts are shown, in upper case, and how many of them are passed over.
     pub(super) relation: String,
     pub(super) facts_from: usize,
+    /// Whether pictures are shown.
+    pub(super) has_pictures: bool,
     /// Number of the latest failure that was shown.
     pub(super) failure: u64,
     /// How often a viewer of this name has come.
@@ -148,6 +150,11 @@ impl RunModel {
         let survey = Survey { tasks: self.tasks.values().cloned().collect(), ..Survey::default() };
         self.order = survey.tree().into_iter().map(|(at, depth)| (survey.tasks[at].number, depth)).collect();
         self.cycle = cycles(&self.tasks);
+    }
+
+    /// Returns whether the run is paused from outside.
+    pub(super) fn is_paused(&self) -> bool {
+        self.figures.is_paused
     }
 
     /// Returns the numbers of the tasks that a viewer sees.

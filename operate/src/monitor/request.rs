@@ -119,6 +119,7 @@ pub(super) fn parse(role: OperatorRole, is_view: bool, body: &[u8]) -> Result<Mo
             task: value["task"].as_u64().filter(|&task| task > 0),
             relation: text("relation"),
             facts_from: number("facts_from"),
+            has_pictures: value["pictures"] == true,
             ..ViewerView::default()
         };
         return Ok(MonitorRequest::View { viewer: text("viewer"), view });

@@ -34,6 +34,20 @@ fn leases_in_a_world_of_scripts() {
     check_world("fleet_leases_test.esl");
 }
 
+/// The picture of the documents is that which the example draws.
+#[test]
+fn the_example_draws_its_fleet() {
+    let folder = Folder::new("fleet-picture");
+    let example = esl_conformance::root().join("examples/fleet");
+    let mut command = eslvm(&["run", "--clock", "virtual", "--allow-write"]);
+    command.arg(example.join("scripted.esl")).arg("fleet.svg").current_dir(folder.path());
+    let run = process::run(&mut command, "");
+    assert_eq!(run.status, Some(0), "{}", run.errors);
+    let drawn = std::fs::read_to_string(folder.path().join("fleet.svg")).expect("it is drawn");
+    let shown = std::fs::read_to_string(example.join("fleet.svg")).expect("it is there");
+    assert_eq!(drawn, shown);
+}
+
 /// An agent that works for others, and is the router.
 const ROVER: &str = "(require :fleet)
 (define-cause :jammed ())

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use esl_conformance::folder::Folder;
 use esl_conformance::process::PATIENCE;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::operate::{Operated, request, until};
 
@@ -113,6 +113,40 @@ fn status(answer: &str) -> &str {
 
 fn row<'a>(event: &'a Value, name: &str) -> Option<&'a Value> {
     event["rows"].as_array()?.iter().find(|row| row["name"] == name)
+}
+
+/// Pictures come only to those who look at them, one that cannot be drawn leaves the others, and a run that
+/// deadlocks does so beside them.
+#[test]
+fn a_viewer_sees_the_pictures_of_the_program() {
+    let program = "
+(define-cause :no-map ())
+(defvar *drawn* 0)
+(define-picture map (format nil \"<svg id='~d'/>\" (incf *drawn*)))
+(define-picture plan (fail :no-map))
+(define-picture endless (loop))
+(define-picture none nil)
+(define-picture both (list \"<svg/>\" 3 \"<svg></svg>\"))
+(read-line *standard-input* nil)
+(print (plusp *drawn*))";
+    let folder = Folder::new("monitor_pictures");
+    let WatchedRun { run, address, observe, .. } = watch(&folder, program);
+    let mut viewer = Viewer::come(&address, &observe, "one");
+    assert!(viewer.next()["pictures"].is_null());
+    let view = r#"{"viewer":"one","count":50,"pictures":true}"#;
+    assert_eq!(status(&post(&address, "/view", &observe, view)), "200");
+    let event = viewer.until("the pictures", |event| event["pictures"].is_array());
+    let expected = json!([
+        { "name": "map", "texts": ["<svg id='1'/>"], "failure": null },
+        { "name": "plan", "texts": [], "failure": "A failure of cause :NO-MAP." },
+        { "name": "endless", "texts": [], "failure": "A failure of cause :BUDGET-EXHAUSTED." },
+        { "name": "none", "texts": [], "failure": null },
+        { "name": "both", "texts": ["<svg/>", "<svg></svg>"], "failure": null },
+    ]);
+    assert_eq!(event["pictures"], expected);
+    viewer.until("a later picture", |event| event["pictures"][0]["texts"][0] == "<svg id='2'/>");
+    drop(viewer);
+    assert_eq!(run.finish().output.trim(), "T");
 }
 
 #[test]

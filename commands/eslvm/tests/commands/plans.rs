@@ -2,6 +2,9 @@
 //! `conformance/README.md`. Each runs under the virtual clock with slices of the usual length, and with other
 //! schedules.
 
+use std::path::PathBuf;
+
+use esl_conformance::folder::Folder;
 use esl_conformance::{Expectations, process};
 
 use crate::{eslvm, listed, venv};
@@ -22,6 +25,7 @@ mod programs {
         controllability_is_that_of_a_game = "controllability_is_that_of_a_game.esl",
         no_duration_breaks_a_controllable_plan =
             "no_duration_breaks_a_controllable_plan.esl",
+        pictures_show_times_and_windows = "pictures_show_times_and_windows.esl",
         policies_choose_the_time_in_a_window = "policies_choose_the_time_in_a_window.esl",
         windows_are_those_of_bellman_ford = "windows_are_those_of_bellman_ford.esl",
     }
@@ -48,6 +52,22 @@ fn check_run(path: &str, text: &str, options: &[&str], arguments: &[&str]) -> Re
         return Ok(());
     }
     Err(format!("status {:?}\n{}\n{}", found.status, lines.join("\n"), found.errors))
+}
+
+/// The pictures of the documents are those that the example draws.
+#[test]
+fn a_day_is_drawn_before_and_after_its_repair() {
+    let folder = Folder::new("plans-pictures");
+    let example = esl_conformance::root().join("examples/spacecraft");
+    let names = ["day-before.svg", "day-after.svg"];
+    let mut command = eslvm(&["run", "--clock", "virtual", "--allow-write"]);
+    command.arg(example.join("day.esl")).args(names).current_dir(folder.path());
+    let run = process::run(&mut command, "");
+    assert_eq!(run.status, Some(0), "{}", run.errors);
+    for name in names {
+        let read = |path: PathBuf| std::fs::read_to_string(path).expect("it can be read");
+        assert_eq!(read(folder.path().join(name)), read(example.join(name)), "{name}");
+    }
 }
 
 /// The packages of Python that solve problems.
