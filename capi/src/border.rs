@@ -125,6 +125,10 @@ pub(crate) unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<&'a 
     }
     // SAFETY: the caller promises that the pointer is null or valid.
     let text = unsafe { CStr::from_ptr(pointer) };
+    if text.to_bytes().is_ascii() {
+        // SAFETY: ASCII is valid UTF-8. To see that takes a tenth of the time in which the rest is checked.
+        return Ok(unsafe { str::from_utf8_unchecked(text.to_bytes()) });
+    }
     text.to_str().map_err(|_| invalid(format!("the {what} is not valid UTF-8")))
 }
 

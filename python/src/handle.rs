@@ -9,14 +9,18 @@ use esl::host::TaskInfo;
 use esl::{Data, Error};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
+use smallvec::SmallVec;
 
 use crate::failure::{of_error, of_send};
 use crate::process::{Process, detached};
 use crate::value::{to_data, to_python};
 
+/// Arguments of a call or a signal, of which most have few.
+pub(crate) type CallData = SmallVec<[Data; 2]>;
+
 /// Returns the values of a program that arguments of Python become.
-pub(crate) fn all_data(arguments: &Bound<'_, PyTuple>) -> PyResult<Vec<Data>> {
-    arguments.iter().map(|argument| to_data(&argument)).collect()
+pub(crate) fn all_data(arguments: &Bound<'_, PyTuple>) -> PyResult<CallData> {
+    arguments.iter_borrowed().map(|argument| to_data(&argument)).collect()
 }
 
 /// A way into a run, from all threads. While a program has a handle, it waits for what may come by it.

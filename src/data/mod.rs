@@ -235,6 +235,16 @@ impl Data {
         Datum::new(kind, span)
     }
 
+    /// As [`Data::to_datum`]; a number takes the place of the last one, if nobody has that any more.
+    pub(crate) fn to_datum_again(&self, last: &mut Datum) -> Datum {
+        last.put(match self {
+            Data::Integer(value) => DatumKind::Integer((*value).into()),
+            Data::Float(value) => DatumKind::Float(*value),
+            _ => return self.to_datum(USER_PACKAGE),
+        });
+        last.clone()
+    }
+
     /// Returns a datum of the machine as Rust sees it. A list or vector more than [`MAX_DEPTH`] levels deep
     /// is the string `#`, as the printer has it for levels that it leaves out.
     pub fn from_datum(datum: &Datum) -> Data {
@@ -246,6 +256,12 @@ impl Data {
     /// # Errors
     /// [`Error::NestedTooDeeply`].
     pub(crate) fn whole(datum: &Datum) -> Result<Data, Error> {
+        // Most data are small integers.
+        if let DatumKind::Integer(value) = datum.kind()
+            && let Some(value) = value.as_small()
+        {
+            return Ok(Data::Integer(value));
+        }
         let mut is_cut = false;
         let data = Data::within(datum, MAX_DEPTH, &mut is_cut);
         if is_cut { Err(Error::NestedTooDeeply) } else { Ok(data) }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_host as host;
+use smallvec::SmallVec;
 
 use crate::data::{Data, FromData};
 use crate::error::Error;
@@ -58,9 +59,17 @@ impl Failure {
     ///
     /// # Errors
     /// A failure `:NESTED-TOO-DEEPLY`.
-    pub(super) fn of_arguments(arguments: &[Datum]) -> Result<Vec<Data>, Failure> {
-        let whole: Result<Vec<Data>, Error> = arguments.iter().map(Data::whole).collect();
-        whole.map_err(|error| Failure::new("NESTED-TOO-DEEPLY", [Data::String(error.to_string())]))
+    pub(super) fn of_arguments(arguments: &[Datum]) -> Result<GivenArguments, Failure> {
+        let mut whole = GivenArguments::new();
+        for argument in arguments {
+            whole.push(Data::whole(argument).map_err(|error| Failure::too_deep(&error))?);
+        }
+        Ok(whole)
+    }
+
+    #[cold]
+    fn too_deep(error: &Error) -> Failure {
+        Failure::new("NESTED-TOO-DEEPLY", [Data::String(error.to_string())])
     }
 
     pub(super) fn to_host(&self) -> host::HostFailure {
@@ -81,6 +90,9 @@ impl From<&str> for Failure {
     }
 }
 
+/// Arguments of a call, of which most have few.
+pub(super) type GivenArguments = SmallVec<[Data; 2]>;
+
 /// A call of a function of the embedder's, with its arguments.
 ///
 /// ```
@@ -99,7 +111,7 @@ impl From<&str> for Failure {
 pub struct Call {
     /// Variables of the lambda list, in order and in lower case.
     pub(super) names: Arc<[String]>,
-    pub(super) arguments: Vec<Data>,
+    pub(super) arguments: GivenArguments,
 }
 
 impl Call {

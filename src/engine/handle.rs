@@ -226,7 +226,7 @@ impl InputHandle {
     ///
     /// # Errors
     /// The arguments, if it has none or is not there: [`InputHandle::signal`] waits, or says why.
-    pub fn offer(&self, arguments: Vec<Data>) -> Result<(), Vec<Data>> {
+    pub fn offer<A: IntoIterator<Item = Data>>(&self, arguments: A) -> Result<(), A> {
         if !self.0.admit() {
             return Err(arguments);
         }

@@ -31,7 +31,8 @@ use std::future::Future;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use esl_bytecode::symbol::USER_PACKAGE;
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
 use esl_host::{Host, HostRows, Inbox, RealHost};
 use esl_vm::embed::HostFunction;
 use esl_vm::run::CallError;
@@ -139,13 +140,17 @@ impl Engine {
         V: Into<Data>,
     {
         self.define_by(name, lambda_list, documentation, false, |names| {
+            let mut last = Datum::nil(Span::default());
             HostFunction::AtOnce(Box::new(move |arguments| {
                 let result = Failure::of_arguments(arguments).and_then(|arguments| {
                     let call = Call { names: names.clone(), arguments };
                     let result = catch_unwind(AssertUnwindSafe(|| function(call)));
                     result.unwrap_or_else(|panic| Err(Failure::of_panic(&*panic)))
                 });
-                result.map(|value| value.into().to_datum(USER_PACKAGE)).map_err(|failure| failure.to_host())
+                match result {
+                    Ok(value) => Ok(value.into().to_datum_again(&mut last)),
+                    Err(failure) => Err(failure.to_host()),
+                }
             }))
         })
     }

@@ -1,5 +1,6 @@
 //! The library in a Rust program.
 
+mod calls;
 mod depth;
 mod loops;
 mod operations;

@@ -107,6 +107,8 @@ impl Vm {
             inbox,
             console,
             functions: _,
+            found: _,
+            arguments: _,
             calls,
             answers,
             operations,

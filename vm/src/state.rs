@@ -149,7 +149,7 @@ state! {
             opaques by tell_opaques,
         }
         transient { is_defining }
-        derived { known, symbol_of, homes, runner, streams, nil, t, rights, undefined }
+        derived { known, symbol_of, called, homes, runner, streams, nil, t, rights, undefined }
     }
 }
 
@@ -169,7 +169,7 @@ state! {
         content { exit_status, console, operations, inputs }
         course { senders, attendance }
         transient { answers }
-        process { host, inbox, functions, calls, complaints }
+        process { host, inbox, functions, found, calls, arguments, complaints }
     }
 }
 

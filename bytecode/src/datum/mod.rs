@@ -195,6 +195,24 @@ impl Datum {
         Datum(Arc::new(DatumNode { kind: NodeContents::Properties(properties), span, contents }))
     }
 
+    /// Becomes a datum of the given kind that was written nowhere. Its node is used again if nothing else
+    /// refers to it, so that what passes many numbers needs no memory for each of them.
+    pub fn put(&mut self, kind: DatumKind) {
+        let span = Span::default();
+        let Some(node) = Arc::get_mut(&mut self.0) else {
+            *self = Datum::new(kind, span);
+            return;
+        };
+        node.span = span;
+        match (&mut node.kind, kind) {
+            (NodeContents::Plain(DatumKind::Integer(old)), DatumKind::Integer(new)) => *old = new,
+            (old, new) => {
+                node.contents = contents(&new);
+                *old = NodeContents::Plain(new);
+            }
+        }
+    }
+
     /// As [`Datum::new`], of a kind that may be the symbol `COMMON-LISP:NIL`.
     pub fn of_kind(kind: DatumKind, span: Span) -> Datum {
         match kind {

@@ -23,3 +23,20 @@ fn a_list_gives_its_elements_and_its_tail() {
     assert_eq!(dotted.to_string(), "(1 . 2)");
     assert_eq!(Datum::symbol(Symbol::cl("NIL"), span).to_string(), "NIL");
 }
+
+#[test]
+fn a_datum_that_becomes_another_leaves_others_as_they_are() {
+    let text = |datum: &Datum| datum.to_string();
+    let mut datum = Datum::list([Datum::integer(1, Span::default())], Span::default());
+    let kept = datum.clone();
+    datum.put(DatumKind::Integer(2.into()));
+    assert_eq!((text(&datum), text(&kept)), ("2".into(), "(1)".into()));
+    let node = datum.identity();
+    datum.put(DatumKind::Integer(3.into()));
+    assert_eq!((text(&datum), datum.identity()), ("3".into(), node));
+    datum.put(DatumKind::Call(Datum::nil(Span::default())));
+    assert!(datum.has_calls());
+    let kept = datum.clone();
+    datum.put(DatumKind::Float(0.5));
+    assert_eq!((text(&datum), datum.has_calls(), kept.has_calls()), ("0.5".into(), false, true));
+}

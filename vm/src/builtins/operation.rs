@@ -13,60 +13,89 @@ use crate::vm::Vm;
 use crate::wait::handle;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
-use smallvec::SmallVec;
 
 use super::expect::exactly;
 
-/// Arguments of a call of the host, of which most calls have few.
-pub(super) type HostArguments = SmallVec<[Datum; 6]>;
-
-/// Returns a function of the host, if there is one, and its arguments, from a symbol and a list.
+/// Returns a function of the host, if there is one, for a call by a symbol and a list, and makes that list
+/// the arguments of the call, for as long as it is made.
 ///
 /// # Errors
 /// A failure if an argument is not data, or if the program does not have a right that the function needs.
-pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(Option<GivenIndex>, HostArguments), Exit> {
-    let (name, arguments) = (call[0], call[1]);
-    let function = function_named(vm, name);
-    let mut data = HostArguments::new();
-    let mut rest = arguments;
-    while let Some(pair) = vm.heap.as_cons(rest) {
-        match datum::export(&vm.heap, &vm.names, pair.car, describe) {
-            Ok((datum, work)) => {
-                vm.exchange.charge(work);
-                data.push(datum);
-            }
-            Err(DatumError::NoRoom(bytes)) => {
-                vm.heap.check_room(bytes)?;
-                return Err(Exit::Collect);
-            }
-            Err(error) => return vm.exchange.raise(Raised::Simple(error.to_string())),
-        }
-        rest = pair.cdr;
+pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<Option<GivenIndex>, Exit> {
+    let function = function_named(vm, call[0]);
+    let result = export_arguments(vm, call[1]).and_then(|()| match function {
+        Some(function) => demand_rights(vm, function),
+        None => Ok(()),
+    });
+    if result.is_err() {
+        vm.outside.let_go_of_arguments();
     }
+    result.map(|()| function)
+}
+
+/// Makes a list the arguments of the call of the host that is being made.
+fn export_arguments(vm: &mut Vm, list: Value) -> Result<(), Exit> {
+    let (mut rest, mut count) = (list, 0);
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        rest = pair.cdr;
+        let data = &mut vm.outside.arguments;
+        if let Some(place) = data.get_mut(count)
+            && let Some(number) = datum::number_of(&vm.heap, pair.car)
+        {
+            place.put(number);
+            vm.exchange.charge(datum::WORK_OF_ATOM);
+        } else {
+            data.truncate(count);
+            match datum::export(&vm.heap, &vm.names, pair.car, describe) {
+                Ok((datum, work)) => {
+                    vm.exchange.charge(work);
+                    vm.outside.arguments.push(datum);
+                }
+                Err(DatumError::NoRoom(bytes)) => {
+                    vm.heap.check_room(bytes)?;
+                    return Err(Exit::Collect);
+                }
+                Err(error) => return vm.exchange.raise(Raised::Simple(error.to_string())),
+            }
+        }
+        count += 1;
+    }
+    vm.outside.arguments.truncate(count);
+    Ok(())
+}
+
+/// Checks that the program has the rights that a function of the host needs for its arguments.
+fn demand_rights(vm: &mut Vm, function: GivenIndex) -> Result<(), Exit> {
     let mut permitted = Vec::new();
-    for need in function.map_or(Vec::new(), |function| vm.outside.needs(function)) {
+    for need in vm.outside.needs(function) {
         // One argument may need several rights, and each refusal names it as the program does.
-        if let Some(DatumKind::String(object)) = data.get(need.argument).map(Datum::kind) {
+        let Some(argument) = vm.outside.arguments.get(need.argument).cloned() else { continue };
+        if let DatumKind::String(object) = argument.kind() {
             permitted.push((need.argument, demand(vm, need.right, object.as_ref())?));
         }
     }
     for (argument, object) in permitted {
-        data[argument] = Datum::string(&object, Span::default());
+        vm.outside.arguments[argument] = Datum::string(&object, Span::default());
     }
-    Ok((function, data))
+    Ok(())
 }
 
 /// Returns the function of the host that a symbol names.
-fn function_named(vm: &Vm, symbol: Value) -> Option<GivenIndex> {
+fn function_named(vm: &mut Vm, symbol: Value) -> Option<GivenIndex> {
     let name = vm.heap.symbol(symbol)?.name;
     let characters = vm.heap.string(name)?;
+    if let Some(function) = vm.outside.found_before(symbol, characters) {
+        return Some(function);
+    }
     // Almost all names are short and ASCII, and need no memory of their own.
     let mut bytes = [0_u8; 64];
     if let Some(bytes) = bytes.get_mut(..characters.len())
         && characters.iter().all(|&code| code < 0x80)
     {
         bytes.iter_mut().zip(characters).for_each(|(byte, &code)| *byte = code as u8);
-        return vm.outside.function(std::str::from_utf8(bytes).ok()?);
+        let function = vm.outside.function(std::str::from_utf8(bytes).ok()?)?;
+        vm.outside.note_found(symbol, function);
+        return Some(function);
     }
     vm.outside.function(&vm.heap.string_text(name)?)
 }
@@ -81,8 +110,15 @@ fn expect_handle(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
 
 pub(super) fn begin_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
+    let function = host_call(vm, arguments)?;
+    let begun = begin_by(vm, function, arguments);
+    vm.outside.let_go_of_arguments();
+    begun
+}
+
+/// Begins an operation by a function of the host, which has its arguments.
+fn begin_by(vm: &mut Vm, function: Option<GivenIndex>, arguments: &[Value]) -> Outcome {
     let [_, _, detached] = exactly(arguments);
-    let (function, data) = host_call(vm, arguments)?;
     let Some(function) = function.filter(|&function| vm.outside.is_operation(function)) else {
         return vm.exchange.raise(Raised::Cause("NOT-IN-THIS-WORLD", arguments[0]));
     };
@@ -91,7 +127,7 @@ pub(super) fn begin_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let handle = handle::make(&mut vm.heap, arguments[0], number, vm.names.known.pending)?;
     vm.scheduler.accounts.take(vm.scheduler.running_account(), Measure::Operations);
     let task = vm.scheduler.running_number();
-    vm.outside.begin_operation(function, &data, handle, detached.is_true(), task);
+    vm.outside.begin_operation(function, handle, detached.is_true(), task);
     Ok(handle)
 }
 

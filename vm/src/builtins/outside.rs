@@ -46,17 +46,16 @@ pub(super) fn universal_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (function, data) = host_call(vm, arguments)?;
+    let function = host_call(vm, arguments)?;
     // The function has effects that cannot be done twice, so what it gives is kept until there is room for
     // it.
     let task = vm.scheduler.task().number;
     let base = vm.offset_of(vm.cpu.base()) as u32;
-    let answer = match vm.outside.answers.take(task, base) {
-        Some(answer) => answer,
-        None => match function.and_then(|function| vm.outside.call(function, &data)) {
-            Some(answer) => answer,
-            None => return vm.exchange.raise(Raised::Cause("NOT-IN-THIS-WORLD", arguments[0])),
-        },
+    let kept = vm.outside.answers.take(task, base);
+    let answer = kept.or_else(|| vm.outside.call(function?));
+    vm.outside.let_go_of_arguments();
+    let Some(answer) = answer else {
+        return vm.exchange.raise(Raised::Cause("NOT-IN-THIS-WORLD", arguments[0]));
     };
     match give_answer(vm, &answer) {
         Err(Exit::Collect) => {

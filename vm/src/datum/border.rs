@@ -46,6 +46,14 @@ pub(crate) fn atom_of(heap: &Heap, value: Value) -> Option<Atom> {
     }
 }
 
+/// Returns the contents of the datum of a number that takes no memory beside that, if a value is one.
+pub(crate) fn number_of(heap: &Heap, value: Value) -> Option<DatumKind> {
+    if let Some(integer) = value.as_fixnum() {
+        return Some(DatumKind::Integer(integer.into()));
+    }
+    heap.as_double(value).map(DatumKind::Float)
+}
+
 /// Returns the value that an atom is.
 ///
 /// # Errors

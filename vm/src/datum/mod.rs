@@ -36,7 +36,7 @@ use crate::value::Value;
 
 pub use border::Atom;
 use border::work_of;
-pub(crate) use border::{WORK_OF_ATOM, atom_of, export, import, import_all, value_of_atom};
+pub(crate) use border::{WORK_OF_ATOM, atom_of, export, import, import_all, number_of, value_of_atom};
 use environment::Environments;
 use parts::{are_parts, datum_with};
 pub(crate) use walk::DatumWalk;

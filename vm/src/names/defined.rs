@@ -29,9 +29,9 @@ impl Names {
     ) -> Result<Value, LoadError> {
         let toplevel = load::open_image(heap, self, name, image)?;
         for name in self.images.exports() {
-            self.packages.register(PackageId::ESL, name, true);
+            self.packages_mut().register(PackageId::ESL, name, true);
         }
-        self.packages.share(PackageId::ESL);
+        self.packages_mut().share(PackageId::ESL);
         // Symbols with objects have missed the new definitions.
         self.undefined_yet.extend(self.symbols.keys().cloned());
         self.define_symbols(heap)?;

@@ -29,9 +29,11 @@ use crate::shape::{CodeKind, Shape};
 use crate::trust;
 use crate::value::Value;
 pub(crate) use builtin_index::find_builtin;
+use called::CalledNames;
 use load::Images;
 
 mod builtin_index;
+mod called;
 pub(crate) mod class;
 mod defined;
 mod known;
@@ -104,8 +106,10 @@ pub(crate) struct Names {
     pub(crate) symbol_of: RefCell<CopyOnWrite<GivenMap<u64, Symbol>>>,
     /// Number of the compiler's next uninterned symbol.
     pub(crate) fresh: Cell<u32>,
-    /// The rules of packages.
+    /// The rules of packages. They are changed by way of [`Names::packages_mut`].
     pub(crate) packages: CopyOnWrite<Packages>,
+    /// The symbols that these give to the names by which the outside has called functions last.
+    pub(crate) called: CalledNames,
     /// The objects of packages.
     pub(crate) package_objects: CopyOnWrite<BTreeMap<PackageId, Value>>,
     /// Home packages of symbols, by name.
@@ -149,6 +153,7 @@ impl Names {
             symbol_of: RefCell::default(),
             fresh: Cell::new(0),
             packages: CopyOnWrite::new(Packages::standard()),
+            called: CalledNames::default(),
             package_objects: CopyOnWrite::default(),
             homes: CopyOnWrite::default(),
             runner: Value::NIL,
@@ -288,7 +293,7 @@ impl Names {
                 let (home, object) = self.home(heap, name)?;
                 if !self.packages.has(home, symbol.name()) {
                     let is_external = home == PackageId::KEYWORD;
-                    self.packages.register(home, symbol.name().to_owned(), is_external);
+                    self.packages_mut().register(home, symbol.name().to_owned(), is_external);
                 }
                 (object, home_flags(name))
             }

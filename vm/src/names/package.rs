@@ -24,7 +24,7 @@ impl Names {
         let package = match self.packages.named(name) {
             Some(package) => package,
             // Without nicknames and used packages, a free name cannot conflict.
-            None => self.packages.make_package(name, &[], &[]).unwrap_or(PackageId::USER),
+            None => self.packages_mut().make_package(name, &[], &[]).unwrap_or(PackageId::USER),
         };
         let object = self.package_object(heap, package)?;
         self.homes.insert(name.clone(), (package, object));
@@ -66,6 +66,7 @@ impl Names {
 
     /// Returns the packages and their rules, for changes.
     pub(crate) fn packages_mut(&mut self) -> &mut Packages {
+        self.called.forget();
         &mut self.packages
     }
 }

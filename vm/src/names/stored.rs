@@ -43,6 +43,7 @@ impl Names {
             symbol_of,
             fresh,
             packages,
+            called: _,
             package_objects,
             homes,
             runner,
@@ -108,6 +109,7 @@ impl Names {
         self.fresh.set(Stored::load(from)?);
         let length = usize::load(from)?;
         self.packages = CopyOnWrite::new(Packages::from_bytes(from.take(length)?)?);
+        self.called.forget();
         let objects: Vec<(u32, Value)> = Stored::load(from)?;
         let objects = objects.into_iter().map(|(package, object)| (PackageId::from_number(package), object));
         self.package_objects = CopyOnWrite::new(objects.collect());

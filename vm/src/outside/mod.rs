@@ -5,7 +5,7 @@ mod under_way;
 
 use std::collections::BTreeMap;
 
-use esl_bytecode::datum::Datum;
+use esl_bytecode::datum::{Datum, DatumKind};
 use esl_heap::state::{StateSink, Stated};
 use esl_host::machine::{Asked, Canceller, Console};
 use esl_host::{
@@ -13,6 +13,7 @@ use esl_host::{
 };
 use indexmap::IndexMap;
 use rustc_hash::FxBuildHasher;
+use smallvec::SmallVec;
 
 use crate::task::TaskNumber;
 use crate::value::Value;
@@ -65,6 +66,17 @@ impl KeptAnswers {
 #[derive(Clone, Copy)]
 pub(crate) struct GivenIndex(usize);
 
+/// Arguments of a call of the host, of which most calls have few.
+pub(crate) type HostArguments = SmallVec<[Datum; 6]>;
+
+/// Functions of the embedder's that are found without a search; a power of two.
+const FOUND: usize = 8;
+
+/// Returns the place of a symbol among these.
+fn place_of(symbol: Value) -> usize {
+    (symbol.bits() >> 5) as usize % FOUND
+}
+
 /// Everything through which a machine reaches the outside.
 pub(crate) struct Outside {
     /// Clocks, files and streams.
@@ -75,8 +87,13 @@ pub(crate) struct Outside {
     pub(crate) console: Console,
     /// The embedder's functions, by name, in the order in which they were given.
     pub(crate) functions: IndexMap<String, Given, FxBuildHasher>,
+    /// Those that programs have called last, by the addresses of their names.
+    pub(crate) found: [(Value, GivenIndex); FOUND],
     /// Number of calls of these.
     pub(crate) calls: u64,
+    /// Arguments of the call that is being made. Numbers stay behind, and their data are those of the next
+    /// call.
+    pub(crate) arguments: HostArguments,
     /// Answers of these, while there is no room for them in the heap.
     pub(crate) answers: KeptAnswers,
     /// The operations under way.
@@ -118,7 +135,9 @@ impl Outside {
             host: Asked::new(host),
             console: Console::default(),
             functions: IndexMap::default(),
+            found: [(Value::NIL, GivenIndex(0)); FOUND],
             calls: 0,
+            arguments: HostArguments::new(),
             answers: KeptAnswers::default(),
             operations: Operations::default(),
             inputs: BTreeMap::new(),
@@ -134,15 +153,35 @@ impl Outside {
         self.functions.get_index_of(name).map(GivenIndex)
     }
 
+    /// Returns the function of the embedder's that this symbol has named before, if it has this name too: the
+    /// address may be that of another symbol since.
+    pub(crate) fn found_before(&self, symbol: Value, name: &[u32]) -> Option<GivenIndex> {
+        let (known, index) = self.found[place_of(symbol)];
+        let (given, _) = self.functions.get_index(index.0).filter(|_| known == symbol)?;
+        let is_it = given.len() == name.len() && given.bytes().map(u32::from).eq(name.iter().copied());
+        is_it.then_some(index)
+    }
+
+    /// Notes that a symbol names a function of the embedder's, whose name is ASCII.
+    pub(crate) fn note_found(&mut self, symbol: Value, index: GivenIndex) {
+        self.found[place_of(symbol)] = (symbol, index);
+    }
+
+    /// Lets go of the arguments of a call that is over, except for the numbers before all others.
+    pub(crate) fn let_go_of_arguments(&mut self) {
+        let is_number = |datum: &&Datum| match datum.kind() {
+            DatumKind::Integer(integer) => integer.as_small().is_some(),
+            kind => matches!(kind, DatumKind::Float(_)),
+        };
+        let numbers = self.arguments.iter().take_while(is_number).count();
+        self.arguments.truncate(numbers);
+    }
+
     /// Calls a function of the embedder's that returns at once; `None` if it begins an operation.
-    pub(crate) fn call(
-        &mut self,
-        function: GivenIndex,
-        arguments: &[Datum],
-    ) -> Option<Result<Datum, HostFailure>> {
+    pub(crate) fn call(&mut self, function: GivenIndex) -> Option<Result<Datum, HostFailure>> {
         self.calls += 1;
         let (name, given) = self.functions.get_index_mut(function.0)?;
-        let call = HostCall { name, arguments, effect: given.effect, operation: None };
+        let call = HostCall { name, arguments: &self.arguments, effect: given.effect, operation: None };
         match &mut given.function {
             HostFunction::AtOnce(function) => Some(self.host.call(call, function)),
             HostFunction::Operation(_) => None,
@@ -163,7 +202,6 @@ impl Outside {
     pub(crate) fn begin_operation(
         &mut self,
         function: GivenIndex,
-        arguments: &[Datum],
         handle: Value,
         is_detached: bool,
         begun_by: TaskNumber,
@@ -173,7 +211,7 @@ impl Outside {
         self.calls += 1;
         let canceller = Canceller::default();
         self.operations.begin(handle, canceller.clone(), is_detached, begun_by);
-        let number = self.operations.begun;
+        let (number, arguments) = (self.operations.begun, &self.arguments[..]);
         let call = HostCall { name, arguments, effect: given.effect, operation: Some(number) };
         self.host.begin(call, &mut |arguments, action| {
             let arguments = arguments.to_vec();

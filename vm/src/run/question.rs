@@ -88,16 +88,12 @@ impl Vm {
     /// Returns the function that the outside calls by this name, in any case. `None` if there is no room for
     /// the symbol.
     pub fn callee_named(&mut self, name: &str) -> Option<Value> {
-        // Almost all names are short and ASCII, and need no memory of their own.
-        let mut bytes = [0_u8; 64];
-        if let Some(bytes) = bytes.get_mut(..name.len())
-            && name.is_ascii()
-        {
-            bytes.copy_from_slice(name.as_bytes());
-            bytes.make_ascii_uppercase();
-            return self.symbol_named(std::str::from_utf8(bytes).ok()?);
+        if let Some(symbol) = self.names.called.find(name) {
+            return Some(symbol);
         }
-        self.symbol_named(&name.to_uppercase())
+        let symbol = self.symbol_named(&name.to_uppercase())?;
+        self.names.called.keep(name, symbol);
+        Some(symbol)
     }
 
     /// Returns the symbol with this name, which may have a package before it; `None` if there is no room.
