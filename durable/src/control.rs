@@ -50,6 +50,8 @@ struct ControlNotes {
 struct ControlState {
     /// Whether a pause was requested.
     pauses: AtomicBool,
+    /// Whether the machine is to come back, to go on then.
+    interrupts: AtomicBool,
     /// Whether it is over, so that it cannot be paused.
     is_ending: AtomicBool,
     /// Whether the run is a copy, which comes back at the end of its journal, or when an upgrade was tried.
@@ -86,6 +88,20 @@ impl DurableControl {
             inbox.ring();
         }
         true
+    }
+
+    /// Makes the machine come back at its next look into the inbox, between two turns. The run goes on when
+    /// the machine runs again: nothing of this is in the journal.
+    pub fn interrupt(&self) {
+        self.0.interrupts.store(true, Ordering::Relaxed);
+        if let Some(inbox) = &self.told().inbox {
+            inbox.ring();
+        }
+    }
+
+    /// Returns whether the machine was to come back, once.
+    pub(crate) fn takes_interruption(&self) -> bool {
+        self.0.interrupts.swap(false, Ordering::Relaxed) && !self.0.is_ending.load(Ordering::Relaxed)
     }
 
     /// Notes that the run is over but for its cleanups. Returns whether a pause was requested before.

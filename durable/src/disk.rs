@@ -13,6 +13,7 @@ use esl_vm::heap::HeapMemory;
 use esl_vm::stored::{Fork, ForkContents};
 
 use super::generations::{journal_file, snapshot_file};
+use super::kill_place;
 
 /// The file of a journal. Each function is one place at which a process or a system may stop.
 pub trait Disk: Send {
@@ -227,7 +228,7 @@ impl Disk for RealDisk {
         obsolete: Range<u64>,
     ) -> io::Result<SnapshotWriting> {
         let new = NewSnapshot::make(self.folder(), number, obsolete)?;
-        match fork(&new.file, ForkContents { head: &head, memory, add_to_sum }) {
+        match fork(&new.file, ForkContents { head: &head, memory, add_to_sum: add_piece }) {
             Ok(fork) => SnapshotWriting::spawn(move || fork.wait().and_then(|()| new.keep())),
             // The system has no room for a fork, or makes none.
             Err(_) => new.write_copy(head, memory),
@@ -237,6 +238,12 @@ impl Disk for RealDisk {
     fn remove_generation(&mut self, number: u64) -> io::Result<()> {
         remove_files(self.folder(), number)
     }
+}
+
+/// Adds a piece that a fork writes to the checksum.
+fn add_piece(sum: u32, bytes: &[u8]) -> u32 {
+    kill_place::pass();
+    add_to_sum(sum, bytes)
 }
 
 /// Writes to a file by a fork.
@@ -255,11 +262,13 @@ fn remove_files(folder: &Path, number: u64) -> io::Result<()> {
     let snapshot = snapshot_file(folder, number);
     // The journal goes last: a generation without one is not there.
     for file in [snapshot.with_extension("new"), snapshot, journal_file(folder, number)] {
+        kill_place::pass();
         match std::fs::remove_file(file) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}
         }
     }
+    kill_place::pass();
     Ok(())
 }
 
@@ -293,8 +302,11 @@ impl NewSnapshot {
 
     /// Gives the file its name, once all of it is on the disk, and removes the obsolete generations.
     fn keep(mut self) -> io::Result<()> {
+        kill_place::pass();
         self.file.sync_all()?;
+        kill_place::pass();
         std::fs::rename(&self.name, &self.last_name)?;
+        kill_place::pass();
         sync_folder(&self.last_name)?;
         let folder = self.last_name.parent().unwrap_or(Path::new("."));
         self.obsolete.try_for_each(|number| remove_files(folder, number))
@@ -320,32 +332,15 @@ fn write_new(path: &Path, contents: &[u8]) -> io::Result<File> {
 
 /// A disk whose process is killed before or behind a call, for tests of the remaining file.
 #[cfg(all(unix, debug_assertions))]
-pub(crate) struct DeadlyDisk<D> {
-    disk: D,
-    /// Places that are left: two for each call.
-    left: u64,
-    kill: Box<dyn FnMut() + Send>,
-}
+pub(crate) struct DeadlyDisk<D>(pub(crate) D);
 
 #[cfg(all(unix, debug_assertions))]
 impl<D: Disk> DeadlyDisk<D> {
-    /// Calls `kill` at the `place`-th place from here, from 1 on.
-    pub(crate) fn new(disk: D, place: u64, kill: impl FnMut() + Send + 'static) -> DeadlyDisk<D> {
-        DeadlyDisk { disk, left: place, kill: Box::new(kill) }
-    }
-
     fn around<T>(&mut self, call: impl FnOnce(&mut D) -> io::Result<T>) -> io::Result<T> {
-        self.pass();
-        let result = call(&mut self.disk);
-        self.pass();
+        kill_place::pass();
+        let result = call(&mut self.0);
+        kill_place::pass();
         result
-    }
-
-    fn pass(&mut self) {
-        self.left = self.left.saturating_sub(1);
-        if self.left == 0 {
-            (self.kill)();
-        }
     }
 }
 

@@ -23,6 +23,10 @@ pub enum DurableError {
     NoRun(PathBuf),
     /// The journal was changed, or another machine has written it.
     Journal(RecordedError),
+    /// The run has not begun.
+    NoBeginning,
+    /// Its machine cannot be made, or its program not be begun.
+    Machine(esl::Error),
     /// The program contains an object that no file can hold.
     Program(WriteError),
     /// The folder has the run of another program: the changes.
@@ -37,6 +41,9 @@ pub enum DurableError {
     NotWritten(io::Error),
     /// The snapshot of the run does not fit into this process: the reason, in words.
     Snapshot(&'static str),
+    /// The addresses of the snapshot are taken in this process, which another time or another process may
+    /// have free.
+    AddressesTaken,
     /// The system has refused memory, which may have changed the course of the run.
     MemoryRefused,
 }
@@ -67,6 +74,8 @@ impl fmt::Display for DurableError {
                 write!(f, "the journal has version {version} of the format, which this machine cannot read")
             }
             DurableError::Journal(error) => write!(f, "the journal cannot be read: {error}"),
+            DurableError::NoBeginning => f.write_str("the folder has no run that has begun"),
+            DurableError::Machine(error) => write!(f, "the machine of the run cannot be made: {error}"),
             DurableError::Program(error) => write!(f, "the program cannot be durable: {error}"),
             DurableError::OtherProgram(changes) => write!(
                 f,
@@ -90,6 +99,10 @@ impl fmt::Display for DurableError {
             DurableError::Snapshot(reason) => {
                 write!(f, "the snapshot of the run cannot be loaded: {reason}; nothing has changed")
             }
+            DurableError::AddressesTaken => f.write_str(
+                "the snapshot of the run cannot be loaded: its addresses are taken in this process, which seldom \
+                 happens; start it again; nothing has changed",
+            ),
             DurableError::MemoryRefused => f.write_str(
                 "the system has refused memory, which may change the course of the run; the run stops, and the \
                  same command goes on",

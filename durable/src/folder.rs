@@ -12,9 +12,9 @@ const LOCK: &str = "lock";
 #[cfg(unix)]
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(2);
 
-/// The folder of a durable run, which this process has.
+/// The folder of a durable run, or of several, which this process has until this is dropped.
 #[derive(Debug)]
-pub(crate) struct RunFolder {
+pub struct RunFolder {
     path: PathBuf,
     /// Locked until it is closed, which the system does when the process ends.
     _lock: File,
@@ -25,7 +25,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`DurableError`].
-    pub(crate) fn open(path: &Path) -> Result<RunFolder, DurableError> {
+    pub fn open(path: &Path) -> Result<RunFolder, DurableError> {
         let mut builder = fs::DirBuilder::new();
         builder.recursive(true);
         #[cfg(unix)]
@@ -53,7 +53,7 @@ impl RunFolder {
     }
 
     /// Returns the path of the folder.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.path
     }
 }

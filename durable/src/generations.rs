@@ -101,7 +101,12 @@ pub(crate) fn find(folder: &Path) -> Result<Option<FoundJournals>, DurableError>
         for number in base + 1..=last {
             let next = read_journal(folder, number)?;
             if !journal.append(next) {
-                let problem = "the next journal does not begin at its end";
+                let problem = if journal.recorded.torn > 0 {
+                    "its end is missing, and the next journal is there, as after a loss of power without \
+                     `--durability power`"
+                } else {
+                    "the next journal does not begin at its end"
+                };
                 return Err(DurableError::Journal(RecordedError::Damaged {
                     offset: journal.length,
                     problem,

@@ -30,17 +30,26 @@
 //! ```
 #![forbid(unsafe_code)]
 
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;
+
+mod agent;
 mod changes;
 mod control;
 mod disk;
+mod engine;
 mod error;
 mod file_effect;
 mod folder;
 mod generations;
 mod host;
 mod interruption;
+mod kill_place;
 mod log;
 mod look;
+mod rest;
 mod resume;
 mod snapshots;
 mod upgrade;
@@ -57,17 +66,20 @@ use esl_vm::heap::range_start;
 use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Vm};
 
+pub use agent::DurableJournal;
 pub use changes::ProgramChanges;
 pub use control::{DurableControl, Resumed};
 pub use disk::{Disk, RealDisk, SnapshotWriting};
+pub use engine::{DurableEnding, DurableEngine, DurableSettings};
 pub use error::DurableError;
+pub use folder::RunFolder;
 pub use host::DurableHost;
 pub use log::LogFigures;
 pub use look::{DurableState, look};
+pub use rest::RunRest;
 pub use snapshots::{SnapshotEvery, SnapshotFigures};
 pub use upgrade::UpgradeReport;
 
-use folder::RunFolder;
 use generations::FoundJournals;
 use log::{JournalLog, Standing};
 use resume::{Resumption, chance, wall_clock};
@@ -103,6 +115,9 @@ pub struct DurableOptions {
     pub downtime: Downtime,
     /// When snapshots are taken.
     pub snapshots: SnapshotEvery,
+    /// Time of day in nanoseconds since 1970 at which the host of the run has begun, if it has one: from then
+    /// on the clock of a run that sleeps goes on, also where a downtime does not count.
+    pub hosted: Option<i64>,
 }
 
 /// A durable run in this process.
@@ -202,7 +217,7 @@ impl DurableRun {
         }
         let torn = (recorded.torn > 0).then_some(length as u64);
         let last = lives.last().copied().unwrap_or_default();
-        let resumption = Resumption::new(&last, time, wall_clock(), options.downtime);
+        let resumption = Resumption::new(&last, time, wall_clock(), options.downtime, options.hosted);
         let standing = Standing { number, base, oldest, ..Standing::after(&recorded, &upgrades) };
         let log = JournalLog::new(disk, writer, length as u64, options.durability, standing);
         let taker = SnapshotTaker::new(options.snapshots, log.clone(), control.clone());
@@ -234,9 +249,7 @@ impl DurableRun {
         };
         let snapshot = start.snapshot.as_ref().ok_or(DurableError::Snapshot("it is missing"))?;
         if machine.heap_range() != Some(snapshot.range) {
-            return Err(DurableError::Snapshot(
-                "its addresses are taken in this process, which seldom happens; start it again",
-            ));
+            return Err(DurableError::AddressesTaken);
         }
         let main = if machine.load_state(&snapshot.state) { machine.main_task() } else { None };
         let main =
@@ -318,19 +331,24 @@ impl DurableRun {
         match &self.found {
             Some(found) => {
                 compare(&found.recorded.beginning, &beginning, program)?;
-                match found.torn {
-                    Some(length) => self.log.truncate(length),
-                    None => self.log.sync_found(),
-                }
-                self.check()
+                self.take_up(found)
             }
             None => {
-                let life =
-                    JournalLife { number: 1, is_pause: false, wall: wall_clock(), time: 0, chance: chance() };
+                let (wall, chance) = (wall_clock(), chance());
+                let life = JournalLife { number: 1, wall, chance, ..JournalLife::default() };
                 self.log.create(&beginning, life);
                 self.check()
             }
         }
+    }
+
+    /// Takes up the journal of a run that goes on.
+    fn take_up(&self, found: &FoundRun) -> Result<(), DurableError> {
+        match found.torn {
+            Some(length) => self.log.truncate(length),
+            None => self.log.sync_found(),
+        }
+        self.check()
     }
 
     /// Returns the reason for which the run has to stop, if there is one.
@@ -369,7 +387,9 @@ impl DurableRun {
             return Err(DurableError::Diverged("the run has ended, and the journal has more of it".into()));
         }
         self.log.end(machine.check(), status);
-        self.check()
+        self.check()?;
+        self.note_rest(RunRest::Ended(status));
+        Ok(())
     }
 
     /// Returns figures of the journal.
@@ -394,6 +414,11 @@ fn compare(found: &Beginning, given: &Beginning, program: &Program) -> Result<()
             return Err(DurableError::OtherProgram(Box::new(changes)));
         }
     }
+    compare_settings(found, given)
+}
+
+/// Refuses to go on with a run that has begun with other settings.
+fn compare_settings(found: &Beginning, given: &Beginning) -> Result<(), DurableError> {
     let settings = [
         (found.config == given.config, "other limits, slice or seed"),
         (found.traces == given.traces, "other traces"),
@@ -409,15 +434,7 @@ fn compare(found: &Beginning, given: &Beginning, program: &Program) -> Result<()
 /// Returns a disk; one on which the process is killed, if a test asks for that.
 #[cfg(all(unix, debug_assertions))]
 fn with_kill(disk: RealDisk) -> Box<dyn Disk> {
-    let place = std::env::var("ESL_DURABLE_KILL_AT").ok().and_then(|place| place.parse().ok());
-    match place {
-        Some(place) => Box::new(disk::DeadlyDisk::new(disk, place, || {
-            let own = rustix::process::getpid();
-            // A process that cannot be killed goes on.
-            _ = rustix::process::kill_process(own, rustix::process::Signal::KILL);
-        })),
-        None => Box::new(disk),
-    }
+    if kill_place::begin() { Box::new(disk::DeadlyDisk(disk)) } else { Box::new(disk) }
 }
 
 /// Returns a disk.

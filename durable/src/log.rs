@@ -324,6 +324,22 @@ impl JournalLog {
         writing.sync();
     }
 
+    /// Returns whether calls of the outside are under way.
+    pub(crate) fn has_open_calls(&self) -> bool {
+        !self.lock().standing.open.is_empty()
+    }
+
+    /// Returns the number of the generation that is written, and the length of its journal.
+    pub(crate) fn place(&self) -> (u64, u64) {
+        let writing = self.lock();
+        (writing.standing.number, writing.written)
+    }
+
+    /// Writes the waiting records, and makes all as safe as the run demands.
+    pub(crate) fn leave(&self) {
+        self.commit();
+    }
+
     /// Writes the waiting records, and syncs the file.
     pub(crate) fn finish(&self) {
         let mut writing = self.lock();

@@ -110,7 +110,7 @@ pub fn look(path: &Path) -> Result<DurableState, DurableError> {
         Some(_) => LookedMachine::Ended(Box::new(run_ended(&recorded)?)),
         None => {
             let last = lives.last().copied().unwrap_or_default();
-            let resumption = Resumption::new(&last, time, wall_clock(), Downtime::Stops);
+            let resumption = Resumption::new(&last, time, wall_clock(), Downtime::Stops, None);
             let copy = DurableRun::copy_of(&recorded, resumption, None);
             LookedMachine::Open(Box::new(copy.run_to_end_of_journal()?))
         }

@@ -27,19 +27,36 @@ pub(crate) struct Resumption {
     /// The program's clock when it was read.
     elapsed: u64,
     chance: u64,
+    /// Whether the program is told of it.
+    is_told: bool,
 }
 
 impl Resumption {
-    /// Creates the restart of a run after the last process or pause, when its clock stood at `time`.
-    pub(crate) fn new(last: &JournalLife, time: u64, wall: i64, downtime: Downtime) -> Resumption {
+    /// Creates the restart of a run after the last process or pause, when its clock stood at `time`. While it
+    /// was asleep, its clock has gone on from the time of day `hosted` on.
+    pub(crate) fn new(
+        last: &JournalLife,
+        time: u64,
+        wall: i64,
+        downtime: Downtime,
+        hosted: Option<i64>,
+    ) -> Resumption {
         let stood = time.max(last.time);
         let ended = last.wall.saturating_add_unsigned(stood - last.time);
-        let gap = wall.checked_sub(ended).and_then(|gap| u64::try_from(gap).ok()).unwrap_or(0);
+        let since = |begin: i64| wall.checked_sub(begin).and_then(|gap| u64::try_from(gap).ok()).unwrap_or(0);
+        let gap = since(ended);
+        let hosted = hosted.filter(|_| last.is_asleep).map_or(0, |hosted| since(hosted.max(ended)));
         let elapsed = match downtime {
             Downtime::Counts => stood.saturating_add(gap),
-            Downtime::Stops => stood,
+            Downtime::Stops => stood.saturating_add(hosted),
         };
-        Resumption { number: last.number + 1, wall, downtime: gap, elapsed, chance: chance() }
+        let is_told = !last.is_asleep;
+        Resumption { number: last.number + 1, wall, downtime: gap, elapsed, chance: chance(), is_told }
+    }
+
+    /// Returns whether the program is told of it: not where it was only asleep.
+    pub(crate) fn is_told(&self) -> bool {
+        self.is_told
     }
 
     /// Returns where the program's clock stands.
@@ -53,6 +70,7 @@ impl Resumption {
         let life = JournalLife {
             number: self.number,
             is_pause: false,
+            is_asleep: false,
             wall: self.wall.saturating_add(since),
             time,
             chance: self.chance,
@@ -69,14 +87,20 @@ mod tests {
     fn a_clock_goes_on_with_or_without_the_gap() {
         let last = JournalLife { number: 3, wall: 1000, time: 50, ..JournalLife::default() };
         let resumed = |wall, downtime| {
-            let resumption = Resumption::new(&last, 80, wall, downtime);
+            let resumption = Resumption::new(&last, 80, wall, downtime, Some(1050));
             (resumption.elapsed(), resumption.downtime)
         };
         assert_eq!(resumed(1100, Downtime::Counts), (150, 70));
         assert_eq!(resumed(1100, Downtime::Stops), (80, 70));
         // The clock of the system was set back.
         assert_eq!(resumed(900, Downtime::Counts), (80, 0));
-        let (life, _) = Resumption::new(&last, 80, 1100, Downtime::Counts).begin(155);
+        let (life, _) = Resumption::new(&last, 80, 1100, Downtime::Counts, None).begin(155);
         assert_eq!((life.number, life.wall, life.time), (4, 1105, 155));
+        // It was asleep from 1030 on.
+        let asleep = JournalLife { is_pause: true, is_asleep: true, ..last };
+        for (hosted, elapsed) in [(None, 80), (Some(1000), 150), (Some(1060), 120), (Some(1200), 80)] {
+            let resumption = Resumption::new(&asleep, 80, 1100, Downtime::Stops, hosted);
+            assert_eq!((resumption.elapsed(), resumption.is_told()), (elapsed, false));
+        }
     }
 }

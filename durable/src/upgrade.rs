@@ -305,7 +305,8 @@ impl DurableRun {
     }
 }
 
-fn read_program(bytes: &[u8]) -> Result<Program, DurableError> {
+/// Reads the program of a journal.
+pub(super) fn read_program(bytes: &[u8]) -> Result<Program, DurableError> {
     // A journal of this machine has a program of this machine.
     Program::from_bytes(bytes).map_err(|_| DurableError::Journal(RecordedError::OtherMachine))
 }

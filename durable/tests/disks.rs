@@ -232,7 +232,7 @@ fn life(
     device: &Device,
 ) -> Result<(u8, String), DurableError> {
     let snapshots = SnapshotEvery::Never;
-    let options = DurableOptions { durability, downtime: Downtime::Stops, snapshots };
+    let options = DurableOptions { durability, downtime: Downtime::Stops, snapshots, hosted: None };
     let run = DurableRun::on(Box::new(disk), options)?;
     if let Some(status) = run.ended() {
         return Ok((status, String::new()));

@@ -32,6 +32,9 @@ pub enum Incoming {
     Input,
     /// A standard stream has room for output again: tasks that wait for that try again.
     Output,
+    /// The run is to come back to the embedder before this round, which begins anew when it goes on. Nothing
+    /// else arrives with it.
+    Interlude,
     /// News of an operation.
     Operation {
         /// Number of the operation.
@@ -69,6 +72,8 @@ pub enum Incoming {
     SenderLeft,
     /// Operators that send messages may attach at any time.
     Attended,
+    /// The run is an agent of a host, which may pass messages to it at any time.
+    Hosted,
 }
 
 #[derive(Default)]

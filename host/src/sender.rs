@@ -187,6 +187,22 @@ impl Admission {
 }
 
 impl Inbox {
+    /// Signals an input of the machine, by its name in any case, without waiting. Unlike the signals of a
+    /// [`Sender`], this one says nothing about others to come.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn try_signal(&self, input: &str, arguments: Vec<Datum>) -> Result<(), SendError> {
+        self.signal(input, arguments, false)
+    }
+
+    fn signal(&self, input: &str, arguments: Vec<Datum>, waits: bool) -> Result<(), SendError> {
+        let input = input.to_uppercase();
+        self.admission().admit(&input, waits)?;
+        self.put(Incoming::Message { input: input.into(), arguments });
+        Ok(())
+    }
+
     /// Says that there is an input of this name; with a capacity, if senders wait when it is full.
     #[doc(hidden)]
     pub fn open_input(&self, name: &str, capacity: Option<usize>) {
@@ -264,7 +280,7 @@ impl Sender {
     /// # Errors
     /// [`SendError::NoSuchInput`] and [`SendError::Ended`].
     pub fn signal(&self, input: &str, arguments: Vec<Datum>) -> Result<(), SendError> {
-        self.send(input, arguments, true)
+        self.inbox().signal(input, arguments, true)
     }
 
     /// Signals an input, as [`Sender::signal`], without waiting.
@@ -272,14 +288,7 @@ impl Sender {
     /// # Errors
     /// [`SendError`].
     pub fn try_signal(&self, input: &str, arguments: Vec<Datum>) -> Result<(), SendError> {
-        self.send(input, arguments, false)
-    }
-
-    fn send(&self, input: &str, arguments: Vec<Datum>, waits: bool) -> Result<(), SendError> {
-        let input = input.to_uppercase();
-        self.inbox().admission().admit(&input, waits)?;
-        self.inbox().put(Incoming::Message { input: input.into(), arguments });
-        Ok(())
+        self.inbox().signal(input, arguments, false)
     }
 
     /// Returns an input, by its name in any case, for many signals.

@@ -43,6 +43,8 @@ pub struct JournalLife {
     pub number: u64,
     /// Whether it has paused the run here.
     pub is_pause: bool,
+    /// Whether the pause is a sleep, of which the program is not told: it had no ties to the process.
+    pub is_asleep: bool,
     /// Time of day, in nanoseconds since 1970.
     pub wall: i64,
     /// Time of the program's clock.
@@ -150,16 +152,24 @@ pub fn journal_end(end: &RecordedEnd) -> Vec<u8> {
 
 pub(super) fn write_life_fields(out: &mut ByteWriter, life: &JournalLife) {
     out.number(life.number);
-    out.byte(life.is_pause.into());
+    out.byte(u8::from(life.is_pause) + u8::from(life.is_asleep));
     out.signed(life.wall);
     out.number(life.time);
     out.0.extend_from_slice(&life.chance.to_le_bytes());
 }
 
 pub(super) fn read_life_fields(from: &mut ByteReader<'_>) -> Option<JournalLife> {
+    let number = from.number()?;
+    let (is_pause, is_asleep) = match from.byte()? {
+        0 => (false, false),
+        1 => (true, false),
+        2 => (true, true),
+        _ => return None,
+    };
     Some(JournalLife {
-        number: from.number()?,
-        is_pause: from.flag()?,
+        number,
+        is_pause,
+        is_asleep,
         wall: from.signed()?,
         time: from.number()?,
         chance: u64::from_le_bytes(from.array()?),
@@ -307,7 +317,8 @@ impl RunJournal {
                 }
                 _ if is_torn(bytes, offset) => break,
                 FoundFrame::Torn => {
-                    let problem = "a part of it is missing, though later parts are there";
+                    let problem = "a part of it is missing, though later parts are there, as after a loss of power \
+                                   without `--durability power`";
                     return Err(RecordedError::Damaged { offset, problem });
                 }
                 FoundFrame::Wrong(problem) => return Err(RecordedError::Damaged { offset, problem }),

@@ -143,11 +143,6 @@ pub fn record(
 /// # Errors
 /// [`WriteError`], if the program contains an object that no file can hold.
 pub fn beginning(program: &Program, setup: &RunSetup, machine: &Vm) -> Result<Beginning, WriteError> {
-    let functions = machine.host_functions().map(|(name, is_operation, needs)| GivenFunction {
-        name: name.into(),
-        is_operation,
-        needs: needs.to_vec(),
-    });
     Ok(Beginning {
         program: program.to_bytes()?,
         config: setup.config.clone(),
@@ -155,10 +150,30 @@ pub fn beginning(program: &Program, setup: &RunSetup, machine: &Vm) -> Result<Be
         folders: setup.folders.clone(),
         program_file: setup.program_file.clone(),
         schedule: setup.schedule.as_ref().map(Schedule::to_string),
-        functions: functions.collect(),
+        functions: functions_of(machine),
         has_operators: program::has_operators(machine),
         identity: ExecutionIdentity::current().to_string(),
     })
+}
+
+/// Returns what a run begins with that has the program and the settings of another one, in this machine.
+pub fn beginning_of(run: &Beginning, machine: &Vm) -> Beginning {
+    Beginning {
+        functions: functions_of(machine),
+        has_operators: program::has_operators(machine),
+        identity: ExecutionIdentity::current().to_string(),
+        ..run.clone()
+    }
+}
+
+/// Returns the functions of the embedder's in a machine.
+fn functions_of(machine: &Vm) -> Vec<GivenFunction> {
+    let functions = machine.host_functions().map(|(name, is_operation, needs)| GivenFunction {
+        name: name.into(),
+        is_operation,
+        needs: needs.to_vec(),
+    });
+    functions.collect()
 }
 
 /// Reads a recorded run, or a journal of a durable run with the snapshot at which it begins.

@@ -206,7 +206,9 @@ packed_by_tag! {
         14 () => { Incoming::Watch }
         15 () => { Incoming::SenderCame }
         16 () => { Incoming::SenderLeft }
-        17 () => { Incoming::Attended };
+        17 () => { Incoming::Attended }
+        18 () => { Incoming::Hosted }
+        19 () => { Incoming::Interlude };
 }
 
 /// Tags of records that are differences from those before. Tags from 65 to 67 are kept for the choices and

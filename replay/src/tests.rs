@@ -147,6 +147,8 @@ pub(crate) fn records() -> Vec<NotedRecord> {
         Incoming::SenderCame,
         Incoming::SenderLeft,
         Incoming::Attended,
+        Incoming::Hosted,
+        Incoming::Interlude,
     ];
     let errors = [HostError::BrokenPipe, HostError::NotFound, HostError::Refused, HostError::Exists];
     let mut all = vec![

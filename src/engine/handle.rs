@@ -50,6 +50,11 @@ pub struct Handle {
 }
 
 impl Handle {
+    /// Returns a handle to a machine that an embedder has without an engine.
+    pub fn to(machine: &Vm) -> Handle {
+        Handle::new(machine)
+    }
+
     pub(super) fn new(machine: &Vm) -> Handle {
         Handle { sender: Sender::new(&machine.inbox()), coming: machine.coming_observers() }
     }

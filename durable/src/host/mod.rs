@@ -20,7 +20,7 @@ use esl_host::{
     ReplayHost, Right, Rights, RunCheck, Wake, WriteMode, has_gone_object,
 };
 
-use esl_replay::JournalGeneration;
+use esl_replay::{JournalGeneration, JournalLife};
 
 use super::control::{DurableControl, Resumed};
 use super::error::DurableError;
@@ -120,17 +120,14 @@ impl<H: Host> DurableHost<H> {
             return true;
         };
         self.live.go_on(self.past.not_due());
+        let is_told = resumption.is_told();
         let (life, downtime) = resumption.begin(self.live.host_mut().monotonic());
         self.log.note_life(life);
         // The upgrade is made before the program is told of its restart.
         let mut first = self.upgrade.take().map_or(Vec::new(), |upgrade| self.begin_upgrade(upgrade));
-        first.push(Incoming::Message {
-            input: "*RESUMED*".into(),
-            arguments: vec![
-                Datum::new(DatumKind::Float(downtime), Span::default()),
-                Datum::integer(i64::try_from(life.number).unwrap_or(i64::MAX), Span::default()),
-            ],
-        });
+        if is_told {
+            first.push(resumed_message(&life, downtime));
+        }
         let mut interrupted = usize::from(self.interrupts);
         for (number, news) in std::mem::take(&mut self.open) {
             if let Some(news) = news {
@@ -186,6 +183,16 @@ impl<H: Host> DurableHost<H> {
             self.inbox.ring();
         }
     }
+}
+
+/// Returns the message by which the program is told that it goes on in another process.
+fn resumed_message(life: &JournalLife, downtime: f64) -> Incoming {
+    let number = i64::try_from(life.number).unwrap_or(i64::MAX);
+    let arguments = vec![
+        Datum::new(DatumKind::Float(downtime), Span::default()),
+        Datum::integer(number, Span::default()),
+    ];
+    Incoming::Message { input: "*RESUMED*".into(), arguments }
 }
 
 /// Asks the host whose turn it is.
@@ -441,6 +448,8 @@ impl<H: Host> Host for DurableHost<H> {
         };
         if pauses || comes_back {
             contents.push(Incoming::Stop);
+        } else if contents.is_empty() && self.is_live() && self.control.takes_interruption() {
+            contents.push(Incoming::Interlude);
         }
         contents
     }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
 use esl_bytecode::span::Span;
 use esl_heap::store::{Stored, StoredBytes};
-use esl_host::GoneObject;
+use esl_host::{GoneObject, has_gone_object};
 
 use crate::heap::{AllocError, Heap};
 use crate::names::{GivenMap, Names};
@@ -86,6 +86,11 @@ impl Opaques {
     /// Returns the number of things held.
     pub(crate) fn len(&self) -> usize {
         self.held.len()
+    }
+
+    /// Returns whether the program holds a thing of this process.
+    pub(crate) fn holds_things(&self) -> bool {
+        self.held.values().any(|(_, datum)| !has_gone_object(std::slice::from_ref(datum)))
     }
 
     /// Notes which objects the marking that is about to end has not reached.

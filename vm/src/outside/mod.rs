@@ -110,7 +110,7 @@ pub(crate) struct Outside {
     pub(crate) exit_status: Option<u8>,
 }
 
-/// Operators of a run that are not attached yet.
+/// Operators of a run that are not attached yet, or the host of an agent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ExpectedOperators {
     /// None can come.

@@ -64,6 +64,10 @@ fn take_in_one(vm: &mut Vm, incoming: Incoming) -> bool {
     match incoming {
         Incoming::Signal(signal) => return end_by_signal(vm, signal),
         Incoming::Stop => return true,
+        Incoming::Interlude => {
+            vm.scheduler.rounds -= 1;
+            return true;
+        }
         Incoming::Input => wake_readers(vm),
         Incoming::Output => wake_writers(vm),
         Incoming::Operation { number, news } => hear(vm, number, news),
@@ -81,6 +85,8 @@ fn take_in_one(vm: &mut Vm, incoming: Incoming) -> bool {
             vm.scheduler.is_paused &= vm.outside.senders > 0;
         }
         Incoming::Attended => vm.outside.attendance = ExpectedOperators::MayCome,
+        // That it waits for messages is not worth a report.
+        Incoming::Hosted => vm.outside.attendance = ExpectedOperators::IsAwaited,
     }
     false
 }

@@ -141,6 +141,28 @@ impl Vm {
         self.scheduler.clock.now
     }
 
+    /// Returns when a task goes on by itself, by the program's clock in nanoseconds: 0 if one can now, `None`
+    /// if all wait for something from outside. Asks nothing of the host.
+    pub fn next_turn(&mut self) -> Option<u64> {
+        let scheduler = &mut self.scheduler;
+        let can_go_on = !scheduler.queues.are_empty()
+            || !scheduler.deliveries.is_empty()
+            || scheduler.open_turn.is_some();
+        if can_go_on { Some(0) } else { scheduler.first_timer() }
+    }
+
+    /// Returns whether the program has ties to this process that another one cannot take up: things of the
+    /// host, senders of signals, streams that it waits for, output under way.
+    pub fn is_tied_to_process(&self) -> bool {
+        let Vm { names, outside, scheduler, embedder, .. } = self;
+        names.opaques.holds_things()
+            || outside.senders > 0
+            || outside.console.is_behind()
+            || !scheduler.readers.is_empty()
+            || !scheduler.writers.is_empty()
+            || embedder.first.is_some()
+    }
+
     /// Returns the time that is left to the first timer, in nanoseconds.
     pub fn time_to_next_timer(&mut self) -> Option<u64> {
         let first = self.scheduler.first_timer()?;

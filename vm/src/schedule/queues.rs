@@ -56,6 +56,11 @@ impl RunQueues {
         }
     }
 
+    /// Returns whether no task has a place.
+    pub(crate) fn are_empty(&self) -> bool {
+        self.urgent.is_empty() && self.queues.iter().all(VecDeque::is_empty)
+    }
+
     /// Takes the first urgent task.
     pub(crate) fn next_urgent(&mut self, tasks: &Tasks) -> Option<TaskIndex> {
         pop(&mut self.urgent, tasks, &mut Choices::first())

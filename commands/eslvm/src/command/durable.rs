@@ -56,7 +56,7 @@ pub(crate) struct StateOptions {
 }
 
 /// Reads a time with its unit, a size of the journal, or `never`.
-fn snapshot_every(text: &str) -> Result<SnapshotEvery, &'static str> {
+pub(super) fn snapshot_every(text: &str) -> Result<SnapshotEvery, &'static str> {
     if text == "never" {
         return Ok(SnapshotEvery::Never);
     }
@@ -162,8 +162,8 @@ pub(crate) fn run_durable(
         DurabilityChoice::Power => Durability::Power,
     };
     let snapshots = state.snapshot_every.unwrap_or_default();
-    let mut run =
-        DurableRun::open(folder, DurableOptions { durability, downtime, snapshots }).map_err(refuse)?;
+    let mut run = DurableRun::open(folder, DurableOptions { durability, downtime, snapshots, hosted: None })
+        .map_err(refuse)?;
     run.warnings().iter().for_each(complain);
     run.control().on_warning(|text| complain(text));
     let (signals, control) = (SignalTarget::default(), run.control());
@@ -348,7 +348,11 @@ fn print_tasks(state: &mut DurableState) {
 fn print_log(state: &DurableState) {
     for life in &state.lives {
         let date = date_of(UNIX_EPOCH + Duration::from_nanos(u64::try_from(life.wall).unwrap_or(0)));
-        let event = if life.is_pause { "paused in" } else { "begun by" };
+        let event = match (life.is_pause, life.is_asleep) {
+            (_, true) => "put to sleep in",
+            (true, false) => "paused in",
+            (false, false) => "begun by",
+        };
         say!("{date}  {event} process {}", life.number);
         if !life.is_pause && state.upgrades.contains(&life.number) {
             say!("{date}  upgraded in process {}", life.number);
@@ -398,6 +402,7 @@ fn print_state(state: &mut DurableState) {
     let lives = state.lives.iter().filter(|life| !life.is_pause).count();
     let standing = match (state.ended, state.lives.last()) {
         (Some(status), _) => format!("ended with status {status}"),
+        (None, Some(last)) if last.is_asleep => "asleep".into(),
         (None, Some(last)) if last.is_pause => "paused".into(),
         _ => "cut off".into(),
     };

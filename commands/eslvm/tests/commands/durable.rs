@@ -159,6 +159,55 @@ fn a_run_goes_on_from_a_snapshot_or_from_the_one_before() {
 
 #[test]
 #[cfg(target_os = "linux")]
+fn a_journal_without_its_end_before_another_one_is_refused() {
+    let agent = Agent::new("durable-gap", AGENT);
+    let mut running = agent.start(&["--snapshot-every", "1ms"]);
+    running.wait_for("count 3");
+    running.send("-TERM");
+    assert_eq!(running.end().0, Some(0));
+    // The run goes on from the snapshot before, by both journals.
+    let mut all = snapshots(&agent);
+    let newest = all.pop().expect("there is a snapshot");
+    std::fs::remove_file(newest).expect("it is there");
+    let journal =
+        all.pop().expect("two generations are kept").to_string_lossy().replace("snapshot-", "journal-");
+    let journal = journal.replace(".esls", ".eslj");
+    let bytes = std::fs::read(&journal).expect("it is there");
+    std::fs::write(&journal, &bytes[..bytes.len() - 3]).expect("it can be written");
+    let (status, _, errors) = agent.run(&[]);
+    assert!(
+        status == Some(3) && errors.contains("its end is missing, and the next journal is there"),
+        "{errors}"
+    );
+    std::fs::write(&journal, &bytes).expect("it can be written");
+    assert_eq!(agent.run(&[]).0, Some(7));
+}
+
+/// Timers whose time has passed while there was no process.
+#[test]
+fn overdue_timers_fire_behind_the_news_of_the_restart_in_their_order() {
+    let text = "(define-input *resumed*)
+        (defun say (text) (format t \"~a~%\" text) (finish-output))
+        (spawn (:name 'watcher :daemon t) (wait-for-event *resumed*) (say \"resumed\"))
+        (spawn (sleep 0.30) (say \"second\"))
+        (spawn (sleep 0.25) (say \"first\"))
+        (spawn (sleep 0.35) (say \"third\"))
+        (say \"ready\")
+        (sleep 0.4)
+        (say \"over\")";
+    let agent = Agent::new("durable-overdue", text);
+    let mut running = agent.start(&[]);
+    running.wait_for("ready");
+    running.send("-KILL");
+    running.end();
+    std::thread::sleep(std::time::Duration::from_millis(450));
+    let (_, output, errors) = agent.run(&[]);
+    let lines: Vec<&str> = output.lines().filter(|line| *line != "ready").collect();
+    assert_eq!(lines, ["resumed", "first", "second", "third", "over"], "{errors}");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
 fn a_paused_run_goes_on_from_a_snapshot() {
     let agent = Agent::new("durable-snapshot-pause", AGENT);
     let mut running = agent.start(&["--snapshot-every", "1h"]);
