@@ -28,7 +28,8 @@ const SECTIONS: [(&str, &str); 12] = [
 ];
 
 /// Folders of the packages that the table of tools lists as a whole.
-const TOOLS: [&str; 14] = [
+const TOOLS: [&str; 15] = [
+    "agents",
     "analysis",
     "commands/eslc",
     "commands/eslvm",

@@ -3,6 +3,9 @@
 mod durable;
 mod explore;
 mod figures;
+#[cfg(unix)]
+mod host;
+mod injecting;
 mod options;
 mod program;
 mod run;
@@ -123,6 +126,10 @@ pub fn main() -> u8 {
         }
         EslvmAction::Replay { options } => replay::run(&options),
         EslvmAction::State { options } => run_state(&options),
+        #[cfg(unix)]
+        EslvmAction::Host { options } => host::run_host(&options),
+        #[cfg(unix)]
+        EslvmAction::Agents { options } => host::run_agents(&options),
         EslvmAction::Test {
             filter,
             watch,

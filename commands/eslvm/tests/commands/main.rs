@@ -5,6 +5,8 @@
 mod listed;
 
 #[cfg(unix)]
+mod agents;
+#[cfg(unix)]
 mod attach;
 #[cfg(unix)]
 mod attacks;
