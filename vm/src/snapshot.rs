@@ -76,7 +76,12 @@ impl Snapshot {
 
     /// Returns the bytes that the rest of this snapshot takes, about.
     pub fn bytes_of_rest(&self) -> usize {
-        size_of::<Snapshot>() + self.scheduler.tasks.bytes() + self.database.footprint()
+        let Scheduler { tasks, queues, .. } = &self.scheduler;
+        size_of::<Snapshot>()
+            + self.heap.bytes_of_tables()
+            + tasks.bytes()
+            + queues.bytes()
+            + self.database.footprint()
     }
 }
 

@@ -129,6 +129,13 @@ impl HeapImage {
     pub fn bytes_of_all(&self) -> usize {
         self.count.load(Ordering::Relaxed)
     }
+
+    /// Returns the bytes that this image takes beside pages: its tables of them.
+    pub fn bytes_of_tables(&self) -> usize {
+        let page = size_of::<Arc<Page>>() + size_of::<u64>();
+        let large = |image: &LargeImage| size_of::<LargeImage>() + image.contents.len() * page;
+        self.arenas.len() * size_of::<Option<ArenaImage>>() + self.large.iter().map(large).sum::<usize>()
+    }
 }
 
 impl Heap {

@@ -394,6 +394,7 @@ impl PointRun {
     /// Does what is to be done between two turns. Returns how the run has ended, if it has.
     fn come_to_point(&self, vm: &mut Vm) -> Option<RunOutcome> {
         vm.scheduler.rounds += 1;
+        vm.scheduler.queues.sweep(&vm.scheduler.tasks);
         if vm.outside.inbox.is_rung() && run::take_in(vm) {
             return Some(RunOutcome::Stopped);
         }

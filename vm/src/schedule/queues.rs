@@ -21,6 +21,9 @@ use crate::task::{PRIORITIES, Serial, TaskIndex, TaskState, Tasks};
 /// Maximal number of runnable tasks among which a choice is made.
 const CHOICE: usize = 8;
 
+/// Places that are not worth a sweep.
+const SWEPT: usize = 64;
+
 /// Place in a queue.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Queued {
@@ -59,6 +62,22 @@ impl RunQueues {
     /// Returns whether no task has a place.
     pub(crate) fn are_empty(&self) -> bool {
         self.urgent.is_empty() && self.queues.iter().all(VecDeque::is_empty)
+    }
+
+    /// Drops places that are no longer good, if they are most of the places. An exploration takes none: it
+    /// chooses tasks by other means.
+    pub(crate) fn sweep(&mut self, tasks: &Tasks) {
+        let places = self.queues.iter().map(VecDeque::len).sum::<usize>() + self.urgent.len();
+        if places > SWEPT && places > 2 * tasks.iter().count() {
+            let queues = self.queues.iter_mut().chain([&mut self.urgent]);
+            queues.for_each(|queue| queue.retain(|&queued| is_valid(queued, tasks)));
+        }
+    }
+
+    /// Returns the bytes that the queues take.
+    pub(crate) fn bytes(&self) -> usize {
+        let places = self.queues.iter().chain([&self.urgent]).map(VecDeque::len).sum::<usize>();
+        places * size_of::<Queued>()
     }
 
     /// Takes the first urgent task.
