@@ -8,16 +8,16 @@
 //! Not here: changes by functions that the program makes while it runs, which count as unseen themselves
 //! (`eval`, `compile`, `load`); what the library shares between tasks, which it protects.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 
 use esl::program::Program;
 use esl_bytecode::builtin::{Builtin, Shares};
 use esl_bytecode::compile::MODULE_SOURCES;
-use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction};
+use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::sharing::Sharing;
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
 use super::Grain;
 use super::forms::SourceForms;
@@ -51,7 +51,7 @@ pub enum UnseenKind {
     /// Of whatever code changes that is made while the program runs.
     Code,
     /// Of functions, classes and packages by forms at top level that are evaluated while tasks may run, which
-    /// only grain `ticks` sees.
+    /// only grain `ticks` sees. A new function that no code before it names is none.
     LateDefinition,
     /// Of functions, classes and packages by functions of the program, which no grain sees: states leave them
     /// out.
@@ -122,6 +122,7 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
         Grain::Changes | Grain::Reads => false,
     };
     let (late, writers) = (first_late_form(module), slot_writers(module));
+    let named = if late == usize::MAX { HashMap::new() } else { first_names(module) };
     let mut forms = SourceForms::default();
     let mut found: Vec<UnseenChange> = Vec::new();
     for (number, function) in module.functions.iter().enumerate() {
@@ -135,8 +136,14 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
             }
             for kind in kinds {
                 let is_late = form.is_some_and(|form| form >= late);
-                let kind =
-                    if kind == UnseenKind::Definition && is_late { UnseenKind::LateDefinition } else { kind };
+                let is_new = defines_function(instr)
+                    && symbols_of(module, function).iter().all(|name| {
+                        is_of_library(name) || named.get(name).is_none_or(|&first| first >= number)
+                    });
+                let kind = match kind {
+                    UnseenKind::Definition if is_late && !is_new => UnseenKind::LateDefinition,
+                    kind => kind,
+                };
                 if grain == Grain::Ticks && kind != UnseenKind::Definition
                     || found.iter().any(|change| change.kind == kind)
                 {
@@ -215,6 +222,60 @@ fn first_late_form(module: &Module) -> usize {
     let spawning =
         |toplevel: &FunctionNumber| module.functions.get(toplevel.0 as usize).is_some_and(may_spawn);
     module.toplevel.iter().position(spawning).map_or(usize::MAX, |form| form + 1)
+}
+
+/// Returns whether an instruction defines a function, a macro or a variable.
+fn defines_function(instr: Instr) -> bool {
+    let (Instr::CallBuiltin { builtin, .. } | Instr::TailCallBuiltin { builtin, .. }) = instr else {
+        return false;
+    };
+    let defining =
+        [Builtin::SetFunction, Builtin::SetMacro, Builtin::ProclaimSpecial, Builtin::DefineConstant];
+    Builtin::from_number(builtin.0).is_some_and(|builtin| defining.contains(&builtin))
+}
+
+/// Functions that find a symbol by its name.
+const FINDING: &[&str] =
+    &["FIND-SYMBOL", "READ", "READ-FROM-STRING", "READ-PRESERVING-WHITESPACE", "APROPOS-LIST"];
+
+/// Returns for each symbol the first function that names it; for all of them the first one of all, if the
+/// program may find symbols by their names.
+fn first_names(module: &Module) -> HashMap<Symbol, usize> {
+    let mut first = HashMap::new();
+    for (number, function) in module.functions.iter().enumerate() {
+        for symbol in symbols_of(module, function) {
+            first.entry(symbol).or_insert(number);
+        }
+    }
+    if first.keys().any(|symbol| symbol.is_in(CL_PACKAGE) && FINDING.contains(&symbol.name())) {
+        first.values_mut().for_each(|number| *number = 0);
+    }
+    first
+}
+
+/// Returns the symbols among the constants of a function.
+fn symbols_of(module: &Module, function: &ModuleFunction) -> HashSet<Symbol> {
+    let mut open: Vec<PoolIdx> = function.constants.clone();
+    let (mut seen, mut symbols) = (HashSet::new(), HashSet::new());
+    while let Some(index) = open.pop() {
+        if !seen.insert(index.0) {
+            continue;
+        }
+        match module.constants.get(index.0 as usize) {
+            Some(Constant::Symbol(symbol)) => {
+                symbols.insert(symbol.clone());
+            }
+            Some(Constant::Cons(first, rest)) => open.extend([*first, *rest]),
+            Some(Constant::Vector(elements) | Constant::Array(_, elements)) => open.extend(elements),
+            _ => {}
+        }
+    }
+    symbols
+}
+
+/// Returns whether a symbol belongs to the library.
+fn is_of_library(symbol: &Symbol) -> bool {
+    [CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE].iter().any(|name| symbol.is_in(name))
 }
 
 /// Returns the instructions of a function, each with its place in the code.
@@ -398,10 +459,14 @@ mod tests {
             ("(defun f () (defun g () 1))", &[Definition]),
             ("(defun f (x) (change-class x 'tank))", &[Slot, Definition]),
             ("(defun f (name) (intern name))", &[Definition]),
-            ("(spawn (print 1)) (defun f () 1)", &[LateDefinition]),
-            ("(defun go-on () (spawn (print 1))) (defun f () 1) (go-on)", &[]),
-            ("(defun go-on () (spawn (print 1))) (go-on) (defun f () 1)", &[LateDefinition]),
-            ("(print (mapcar (lambda (x) (spawn x)) '(1))) (defun f () 1)", &[LateDefinition]),
+            ("(spawn (print 1)) (defun f () 1) (spawn (f))", &[]),
+            ("(spawn (f)) (defun f () 1)", &[LateDefinition]),
+            ("(spawn (funcall 'f)) (defun f () 1)", &[LateDefinition]),
+            ("(spawn (apply (second '((f) f)) nil)) (defun f () 1)", &[LateDefinition]),
+            ("(spawn (funcall (read-from-string \"f\"))) (defun f () 1)", &[LateDefinition]),
+            ("(defun go-on () (spawn (f))) (defun f () 1) (go-on)", &[]),
+            ("(defun go-on () (spawn (f))) (go-on) (defun f () 1)", &[LateDefinition]),
+            ("(print (mapcar (lambda (x) (spawn x)) '(f))) (defun f () 1)", &[LateDefinition]),
             ("(task-net (a (print 1)) (b (print 2))) (defun f () 1)", &[]),
             ("(defun f () (setq *print-length* 3))", &[LibraryVariable]),
         ];

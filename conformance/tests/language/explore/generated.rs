@@ -253,6 +253,28 @@ const UNSEEN: &[SharedKind] = &[
         contents: "(list *array* *grid* *grown* *text*)",
     },
     SharedKind {
+        setup: "(defmacro define-hidden (place)
+              `(progn (defvar ,place 0)
+                      (defun hidden () ,place)
+                      (defun set-hidden (n) (setq ,place n))))
+            (macrolet ((define () (list 'define-hidden (gensym)))) (define))",
+        actions: &[
+            "(set-hidden (one-more (hidden)))",
+            "(push (hidden) *seen-#*)",
+            "(when (eql (hidden) 0) (set-hidden #))",
+        ],
+        contents: "(hidden)",
+    },
+    SharedKind {
+        setup: "(defun kept () (load-time-value (list 0 0)))",
+        actions: &[
+            "(setf (car (kept)) (one-more (car (kept))))",
+            "(let ((old (first (kept)))) (one-more 0) (setf (second (kept)) (+ old #)))",
+            "(push (copy-list (kept)) *seen-#*)",
+        ],
+        contents: "(kept)",
+    },
+    SharedKind {
         setup: "(defvar *table* (make-hash-table))",
         actions: &[
             "(setf (gethash 'key *table*) (one-more (gethash 'key *table* 0)))",
