@@ -20,6 +20,7 @@
 //! ```
 
 mod forms;
+mod late;
 mod library;
 mod random;
 mod unseen;

@@ -8,19 +8,20 @@
 //! Not here: changes by functions that the program makes while it runs, which count as unseen themselves
 //! (`eval`, `compile`, `load`); what the library shares between tasks, which it protects.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::fmt;
 
 use esl::program::Program;
 use esl_bytecode::builtin::{Builtin, Shares};
 use esl_bytecode::compile::MODULE_SOURCES;
-use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, PoolIdx};
+use esl_bytecode::module::{Constant, Module, ModuleFunction};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::sharing::Sharing;
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
 
 use super::Grain;
 use super::forms::SourceForms;
+use super::late::{FirstNames, defines_function, first_late_form};
 use super::library;
 
 /// A kind of use of shared places that a grain does not see.
@@ -122,7 +123,7 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
         Grain::Changes | Grain::Reads => false,
     };
     let (late, writers) = (first_late_form(module), slot_writers(module));
-    let named = if late == usize::MAX { HashMap::new() } else { first_names(module) };
+    let named = FirstNames::of(module, late);
     let mut forms = SourceForms::default();
     let mut found: Vec<UnseenChange> = Vec::new();
     for (number, function) in module.functions.iter().enumerate() {
@@ -136,10 +137,7 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
             }
             for kind in kinds {
                 let is_late = form.is_some_and(|form| form >= late);
-                let is_new = defines_function(instr)
-                    && symbols_of(module, function).iter().all(|name| {
-                        is_of_library(name) || named.get(name).is_none_or(|&first| first >= number)
-                    });
+                let is_new = defines_function(instr) && named.are_new_in(module, number);
                 let kind = match kind {
                     UnseenKind::Definition if is_late && !is_new => UnseenKind::LateDefinition,
                     kind => kind,
@@ -191,95 +189,8 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
     found
 }
 
-/// Returns the number of the first form at top level beside which a task may run: those of `spawn` outlive
-/// the form that makes them, and it, or a function that it calls, may spawn.
-fn first_late_form(module: &Module) -> usize {
-    let is_spawn = |function: &ModuleFunction, instr| {
-        function_named(module, function, instr).is_some_and(|symbol| symbol == Symbol::esl("%SPAWN"))
-    };
-    let all = module.functions.iter();
-    if !all.clone().any(|function| instructions(function).any(|(_, instr)| is_spawn(function, instr))) {
-        return usize::MAX;
-    }
-    let may_spawn = |function: &ModuleFunction| {
-        let runs = |instr| match instr {
-            Instr::CallGlobal { symbol, .. } | Instr::TailCallGlobal { symbol, .. } => {
-                let symbol = constant(module, function, symbol.0 as usize);
-                symbol.is_none_or(|symbol| !symbol.is_in(CL_PACKAGE) && !symbol.is_in(ESL_PACKAGE))
-            }
-            Instr::MakeClosure { .. } => true,
-            Instr::LoadConst { constant: index, .. } => {
-                let index = function.constants.get(index.0 as usize);
-                let constant = index.and_then(|index| module.constants.get(index.0 as usize));
-                matches!(constant, Some(Constant::Function(_)))
-            }
-            instr => is_spawn(function, instr),
-        };
-        let defines = |instr| kinds_of(module, function, instr).contains(&UnseenKind::Definition);
-        let is_definition = instructions(function).any(|(_, instr)| defines(instr));
-        !is_definition && instructions(function).any(|(_, instr)| runs(instr))
-    };
-    let spawning =
-        |toplevel: &FunctionNumber| module.functions.get(toplevel.0 as usize).is_some_and(may_spawn);
-    module.toplevel.iter().position(spawning).map_or(usize::MAX, |form| form + 1)
-}
-
-/// Returns whether an instruction defines a function, a macro or a variable.
-fn defines_function(instr: Instr) -> bool {
-    let (Instr::CallBuiltin { builtin, .. } | Instr::TailCallBuiltin { builtin, .. }) = instr else {
-        return false;
-    };
-    let defining =
-        [Builtin::SetFunction, Builtin::SetMacro, Builtin::ProclaimSpecial, Builtin::DefineConstant];
-    Builtin::from_number(builtin.0).is_some_and(|builtin| defining.contains(&builtin))
-}
-
-/// Functions that find a symbol by its name.
-const FINDING: &[&str] =
-    &["FIND-SYMBOL", "READ", "READ-FROM-STRING", "READ-PRESERVING-WHITESPACE", "APROPOS-LIST"];
-
-/// Returns for each symbol the first function that names it; for all of them the first one of all, if the
-/// program may find symbols by their names.
-fn first_names(module: &Module) -> HashMap<Symbol, usize> {
-    let mut first = HashMap::new();
-    for (number, function) in module.functions.iter().enumerate() {
-        for symbol in symbols_of(module, function) {
-            first.entry(symbol).or_insert(number);
-        }
-    }
-    if first.keys().any(|symbol| symbol.is_in(CL_PACKAGE) && FINDING.contains(&symbol.name())) {
-        first.values_mut().for_each(|number| *number = 0);
-    }
-    first
-}
-
-/// Returns the symbols among the constants of a function.
-fn symbols_of(module: &Module, function: &ModuleFunction) -> HashSet<Symbol> {
-    let mut open: Vec<PoolIdx> = function.constants.clone();
-    let (mut seen, mut symbols) = (HashSet::new(), HashSet::new());
-    while let Some(index) = open.pop() {
-        if !seen.insert(index.0) {
-            continue;
-        }
-        match module.constants.get(index.0 as usize) {
-            Some(Constant::Symbol(symbol)) => {
-                symbols.insert(symbol.clone());
-            }
-            Some(Constant::Cons(first, rest)) => open.extend([*first, *rest]),
-            Some(Constant::Vector(elements) | Constant::Array(_, elements)) => open.extend(elements),
-            _ => {}
-        }
-    }
-    symbols
-}
-
-/// Returns whether a symbol belongs to the library.
-fn is_of_library(symbol: &Symbol) -> bool {
-    [CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE].iter().any(|name| symbol.is_in(name))
-}
-
 /// Returns the instructions of a function, each with its place in the code.
-fn instructions(function: &ModuleFunction) -> impl Iterator<Item = (usize, Instr)> + '_ {
+pub(super) fn instructions(function: &ModuleFunction) -> impl Iterator<Item = (usize, Instr)> + '_ {
     let mut at = 0;
     std::iter::from_fn(move || {
         let instr = Instr::decode(&function.code, at)?;
@@ -326,7 +237,7 @@ fn called(instr: Instr) -> Option<usize> {
 }
 
 /// Returns the name of the function that an instruction calls or refers to.
-fn function_named(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<Symbol> {
+pub(super) fn function_named(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<Symbol> {
     let constant = |index: usize| constant(module, function, index);
     match instr {
         Instr::CallBuiltin { builtin: number, .. } | Instr::TailCallBuiltin { builtin: number, .. } => {
@@ -338,7 +249,7 @@ fn function_named(module: &Module, function: &ModuleFunction, instr: Instr) -> O
 }
 
 /// Returns the symbol that is a constant of a function.
-fn constant(module: &Module, function: &ModuleFunction, index: usize) -> Option<Symbol> {
+pub(super) fn constant(module: &Module, function: &ModuleFunction, index: usize) -> Option<Symbol> {
     match module.constants.get(function.constants.get(index)?.0 as usize)? {
         Constant::Symbol(symbol) => Some(symbol.clone()),
         _ => None,
@@ -346,7 +257,7 @@ fn constant(module: &Module, function: &ModuleFunction, index: usize) -> Option<
 }
 
 /// Returns the kinds of changes that an instruction makes.
-fn kinds_of(module: &Module, function: &ModuleFunction, instr: Instr) -> Vec<UnseenKind> {
+pub(super) fn kinds_of(module: &Module, function: &ModuleFunction, instr: Instr) -> Vec<UnseenKind> {
     match instr.opcode().sharing() {
         Some(Sharing { place: Shares::Variables, is_change: true }) => {
             let Instr::SetSymbolValue { symbol, .. } = instr else { return vec![UnseenKind::Variable] };
