@@ -6,6 +6,8 @@
 //! which failures leave which code, form and task. Functions of the library are known by tables
 //! (`library`); functions of the host by declarations, `(declaim (fails name cause*))`.
 //!
+//! `orders` finds resources that tasks take in different orders.
+//!
 //! Guarantees: a failure that leaves a task in a run is in the table, apart from the cases that the chapter
 //! "Possible failures" of the manual lists. Not here: reading files, printing.
 #![forbid(unsafe_code)]
@@ -22,6 +24,7 @@ mod forms;
 mod guard;
 mod hot;
 mod library;
+mod orders;
 mod rights;
 mod solve;
 mod table;
@@ -31,6 +34,7 @@ mod value;
 pub mod render;
 
 use esl_bytecode::compile::MODULE_SOURCES;
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_compiler::core::{Core, LambdaId};
 use esl_compiler::diagnostic::Sources;
 
@@ -62,11 +66,7 @@ pub fn causes_of_the_library() -> impl Iterator<Item = &'static str> {
 /// and the explanation of a cause if one was asked for.
 pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -> (FailureTable, String) {
     let forms = CoreForms::new(cores);
-    let mut flow = ValueFlow::new(&forms);
-    for form in 0..forms.forms.len() {
-        flow.run(Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT });
-    }
-    flow.solve();
+    let mut flow = solved(&forms);
     add_uncalled(&mut flow, sources);
     flow.solve();
     // Computed causes without a known value.
@@ -79,6 +79,27 @@ pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -
     let maker = Maker { flow: &flow, solution: &solution, sources, all: options.all };
     let explanation = options.explained.as_ref().map(|cause| maker.explain(cause)).unwrap_or_default();
     (maker.table(), explanation)
+}
+
+/// Codes of the warnings of an analysis.
+pub const WARNINGS: [&str; 2] = ["declared-never", "resource-order"];
+
+/// Returns warnings about resources that tasks of a program take in different orders, so that they can
+/// wait for each other.
+pub fn resource_orders(cores: Vec<Core>) -> Vec<Diagnostic> {
+    let forms = CoreForms::new(cores);
+    // Programs without resources are many.
+    if orders::single_resources(&forms).len() < 2 { Vec::new() } else { orders::findings(&solved(&forms)) }
+}
+
+/// Looks at the top-level forms of a program, and at all that these run.
+fn solved(forms: &CoreForms) -> ValueFlow<'_> {
+    let mut flow = ValueFlow::new(forms);
+    for form in 0..forms.forms.len() {
+        flow.run(Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT });
+    }
+    flow.solve();
+    flow
 }
 
 /// Looks at the program's own functions without a call, and at those that call their arguments, apart

@@ -252,7 +252,7 @@ impl Maker<'_, '_> {
             tasks: self.tasks(&by_scope),
             clauses: clauses.into_iter().map(|(_, row)| row).collect(),
             declared: self.declared(),
-            findings: self.findings(),
+            findings: self.findings().into_iter().chain(crate::orders::findings(self.flow)).collect(),
         }
     }
 

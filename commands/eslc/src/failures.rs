@@ -60,9 +60,10 @@ pub(crate) fn list_failures(options: &FailureOptions) -> Result<u8, u8> {
     let compiling = &options.compiling;
     let wanted = AnalysisOptions { all: options.all, explained: options.explain.clone() };
     let AnalysedProgram { mut compiled, table, explanation } = analysed(&options.files, compiling, &wanted)?;
-    let has_failed = table.findings.iter().any(|found| found.severity == Severity::Error);
     // Warnings of the compiler are those of `eslc check`.
     compiled.diagnostics = table.findings.clone();
+    compiling.warnings.apply(&mut compiled);
+    let has_failed = compiled.has_errors();
     print_diagnostics(&compiled, &compiling.style);
     let format = match options.format {
         TableForm::Text => TableFormat::Text,

@@ -275,15 +275,13 @@ fn read(files: &[PathBuf]) -> Result<Vec<Source>, u8> {
 /// Compiles sources, without the warnings that are allowed, and with those that are denied as errors.
 fn compile_sources(
     sources: &[Source],
-    path: &ModulePath,
-    modules: Modules,
     options: &SourceOptions,
+    compile: impl FnOnce() -> Compiled,
 ) -> Result<Compiled, u8> {
     options.warnings.check()?;
     let names: Vec<&str> = sources.iter().map(|source| &*source.name).collect();
     let line = || format!("compiling {}", names.join(", "));
-    let mut compiled = command::StatusLine::new(options.style.quiet)
-        .during(line, || program::compile_with(sources, path, modules));
+    let mut compiled = command::StatusLine::new(options.style.quiet).during(line, compile);
     options.warnings.apply(&mut compiled);
     Ok(compiled)
 }
@@ -295,7 +293,7 @@ fn compiled(
     modules: Modules,
     options: &SourceOptions,
 ) -> Result<Compiled, u8> {
-    let compiled = compile_sources(sources, path, modules, options)?;
+    let compiled = compile_sources(sources, options, || program::compile_with(sources, path, modules))?;
     print_diagnostics(&compiled, &options.style);
     if compiled.has_errors() { Err(NOT_COMPILED) } else { Ok(compiled) }
 }
@@ -377,7 +375,15 @@ fn check_program(
     options: &SourceOptions,
     told: &mut HashSet<(String, u32, String)>,
 ) -> Result<u8, u8> {
-    let mut compiled = compile_sources(&read(files)?, &options.path(files), Modules::Inside, options)?;
+    let sources = read(files)?;
+    let mut compiled = compile_sources(&sources, options, || {
+        let mut compiled = program::compile_with_core(&sources, &options.path(files));
+        let cores = std::mem::take(&mut compiled.core);
+        if !compiled.has_errors() {
+            compiled.diagnostics.extend(esl_analysis::resource_orders(cores));
+        }
+        compiled
+    })?;
     let has_errors = compiled.has_errors();
     let Compiled { diagnostics, sources, .. } = &mut compiled;
     diagnostics.retain(|diagnostic| {

@@ -53,12 +53,13 @@ impl std::error::Error for CodeError {}
 /// Checks the code of a warning.
 fn parse_code(text: &str) -> Result<String, CodeError> {
     match code::find(text) {
-        _ if text == ALL => Ok(text.into()),
+        _ if text == ALL || esl_analysis::WARNINGS.contains(&text) => Ok(text.into()),
         Some(code) if code.severity == Severity::Warning => Ok(text.into()),
         Some(_) => Err(CodeError::OfError),
         None => {
             let warnings = code::ALL.iter().filter(|code| code.severity == Severity::Warning);
-            let near = warnings.map(|code| (TextDiff::from_chars(code.name, text).ratio(), code.name));
+            let names = warnings.map(|code| code.name).chain(esl_analysis::WARNINGS);
+            let near = names.map(|name| (TextDiff::from_chars(name, text).ratio(), name));
             let near = near.filter(|(likeness, _)| *likeness > 0.7).max_by(|a, b| a.0.total_cmp(&b.0));
             Err(CodeError::Unknown(near.map(|(_, name)| name)))
         }
