@@ -7,7 +7,6 @@ use clap::{Args, ValueEnum};
 use esl::program;
 use esl_analysis::render::{InjectedOutcomes, TableFormat, render, render_fmea, render_graph};
 use esl_analysis::{AnalysisOptions, FailureTable, analyze};
-use esl_bytecode::diagnostic::Severity;
 use esl_command as command;
 use esl_command::{NOT_COMPILED, SUCCESS, USAGE};
 
