@@ -1,6 +1,7 @@
 //! The pictures that a program has defined. All viewers share them, so that many take no more of the run's
 //! time than one does.
 
+use std::pin::Pin;
 use std::time::{Duration, Instant};
 
 use esl_bytecode::datum::{Datum, DatumKind};
@@ -21,24 +22,39 @@ const BYTES: usize = 4 << 20;
 
 /// The latest pictures, and when they were asked for.
 #[derive(Default)]
-pub(super) struct PictureBook(Mutex<(Option<Instant>, Value)>);
+struct LatestPictures {
+    then: Option<Instant>,
+    value: Value,
+    /// A question without an answer. There is one at a time, however slow the program is.
+    asked: Option<Pin<Box<dyn Future<Output = Answer> + Send>>>,
+}
+
+/// The pictures for all viewers.
+#[derive(Default)]
+pub(super) struct PictureBook(Mutex<LatestPictures>);
 
 impl PictureBook {
     /// Returns the pictures: objects with a name, and the texts in SVG or the report of a failure. Null if
     /// the program has not answered in time.
     pub(super) async fn latest(&self, sender: &Sender) -> Value {
         let mut latest = self.0.lock().await;
-        if latest.0.is_none_or(|then| then.elapsed() >= PERIOD) {
-            let function = FunctionRef::Named("ESL::%SESSION-PICTURES".into());
-            let arguments = vec![integer(TICKS)];
-            let asked = sender.ask(Question::Call { function, arguments, goes_first: false });
-            latest.1 = match tokio::time::timeout(PATIENCE, asked).await {
+        if latest.then.is_none_or(|then| then.elapsed() >= PERIOD) {
+            let mut asked = latest.asked.take().unwrap_or_else(|| {
+                let function = FunctionRef::Named("ESL::%SESSION-PICTURES".into());
+                let arguments = vec![integer(TICKS)];
+                Box::pin(sender.ask(Question::Call { function, arguments, goes_first: false }))
+            });
+            latest.value = match tokio::time::timeout(PATIENCE, &mut asked).await {
                 Ok(Answer::Values(values)) => values.first().map_or(Value::Null, pictures),
-                _ => Value::Null,
+                Ok(_) => Value::Null,
+                Err(_) => {
+                    latest.asked = Some(asked);
+                    Value::Null
+                }
             };
-            latest.0 = Some(Instant::now());
+            latest.then = Some(Instant::now());
         }
-        latest.1.clone()
+        latest.value.clone()
     }
 }
 

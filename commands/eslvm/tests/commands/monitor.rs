@@ -125,6 +125,7 @@ fn a_viewer_sees_the_pictures_of_the_program() {
 (define-picture map (format nil \"<svg id='~d'/>\" (incf *drawn*)))
 (define-picture plan (fail :no-map))
 (define-picture endless (loop))
+(define-picture slow (sleep 1000))
 (define-picture none nil)
 (define-picture both (list \"<svg/>\" 3 \"<svg></svg>\"))
 (read-line *standard-input* nil)
@@ -140,6 +141,7 @@ fn a_viewer_sees_the_pictures_of_the_program() {
         { "name": "map", "texts": ["<svg id='1'/>"], "failure": null },
         { "name": "plan", "texts": [], "failure": "A failure of cause :NO-MAP." },
         { "name": "endless", "texts": [], "failure": "A failure of cause :BUDGET-EXHAUSTED." },
+        { "name": "slow", "texts": [], "failure": "A failure of cause :TIMEOUT." },
         { "name": "none", "texts": [], "failure": null },
         { "name": "both", "texts": ["<svg/>", "<svg></svg>"], "failure": null },
     ]);
