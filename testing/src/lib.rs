@@ -33,7 +33,7 @@ use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Program};
 use esl_bytecode::datum::Datum;
 use esl_host::{Captured, Host, RealHost, Rights, VirtualHost};
-use esl_vm::explore::{Exploration, Grain, Settings, TimerGrain};
+use esl_vm::explore::{Exploration, Grain, Settings, TimerGrain, UnmetCondition};
 use esl_vm::task::TaskId;
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
@@ -301,12 +301,34 @@ fn explore_if_small(
             let why = format!("a schedule leads to where it never ends ({scope})");
             return Ok(Some(Verdict::Failed { why, output: String::new() }));
         }
+        if let Some(unmet) = found.unmet.first() {
+            let name = name_of_unmet(program, test, &settings, unmet, setup)?;
+            let why = format!("{name} {NEVER_COMES_TRUE} ({scope})");
+            return Ok(Some(Verdict::Failed { why, output: String::new() }));
+        }
         if found.limit.is_some() || found.livelock.is_some() {
             return Ok(None);
         }
         complete = scope.is_complete().then_some(found.states);
     }
     Ok(complete.map(|states| Verdict::PassedAll(format!("explored: complete, {states} states"))))
+}
+
+/// What is said of a condition of `eventually` or `leads-to` that a fair schedule never meets.
+const NEVER_COMES_TRUE: &str =
+    "never comes true on a schedule that goes on for ever, though each task has its turns";
+
+/// Returns the name of a condition that a schedule of a test never meets.
+fn name_of_unmet(
+    program: &Program,
+    test: &Test,
+    settings: &Settings,
+    unmet: &UnmetCondition,
+    setup: &Setup,
+) -> Result<String, Error> {
+    let (mut machine, _) = begin(program, test, 0, setup, Box::new(Written::default().host(setup)))?;
+    machine.follow_to(settings, &unmet.schedule.choices, &mut |_| {});
+    Ok(machine.name_of_condition(unmet.condition).unwrap_or_else(|| "a condition".into()))
 }
 
 /// Runs a test under all schedules: at the grain that is asked for, or at those that show most; and strictly,
@@ -350,6 +372,10 @@ fn explore_grains(
         let badly = found.endings.into_iter().find(|ending| ending.what != Verdict::Passed);
         verdict = match badly.map(|ending| ending.what) {
             Some(Verdict::Failed { why, output }) => failed(&format!("under a schedule, {why}"), output),
+            _ if let Some(unmet) = found.unmet.first() => {
+                let name = name_of_unmet(program, test, &settings, unmet, setup)?;
+                failed(&format!("{name} {NEVER_COMES_TRUE}"), String::new())
+            }
             _ if found.endless.is_some() => failed("a schedule leads to where it never ends", String::new()),
             _ if found.livelock.is_some() => {
                 failed("tasks can go on for ever, though each has its turns", String::new())

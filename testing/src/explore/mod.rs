@@ -30,8 +30,8 @@ use esl::Error;
 use esl::program::{self, Ended, Program};
 use esl_host::{Captured, VirtualHost};
 pub use esl_vm::explore::{
-    Exploration, ExploredEnding, Grain, Livelock, ScheduleEvent, ScheduleStep, SearchLimit, SearchProgress,
-    Settings, StandingTask, Switch, TellStep, TimerGrain,
+    Exploration, ExploredEnding, Fairness, Grain, Livelock, ScheduleEvent, ScheduleStep, SearchLimit,
+    SearchProgress, Settings, StandingTask, Switch, TellStep, TimerGrain, UnmetCondition,
 };
 use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Vm};
@@ -134,6 +134,21 @@ fn side_by_side(others: Vec<Box<dyn FnOnce() + Send + '_>>, own: &mut dyn FnMut(
 /// As [`program::run`].
 pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result<Behaviour, Error> {
     follow_with(program, settings, choices, &|_| Ok(()))
+}
+
+/// Returns the name of a condition of `eventually` or `leads-to` that a schedule never meets.
+///
+/// # Errors
+/// As [`program::run`], and the errors of `prepare`.
+pub fn name_of_condition(
+    program: &Program,
+    settings: &Settings,
+    unmet: &UnmetCondition,
+    prepare: Prepare<'_>,
+) -> Result<String, Error> {
+    let (mut machine, ..) = begin(program, prepare, false)?;
+    machine.follow_to(settings, &unmet.schedule.choices, &mut |_| {});
+    Ok(machine.name_of_condition(unmet.condition).unwrap_or_else(|| "a condition".into()))
 }
 
 /// Returns the choices of an ending with as few as possible of those taken away that are not the first one:

@@ -1,6 +1,8 @@
-//! The task of a program that checks, in each state of an exploration, that its conditions hold (`always`).
+//! The task of a program that checks its conditions in each state of an exploration (`always`, `eventually`,
+//! `leads-to`), and what it has found.
 
 use super::point::runnable_tasks;
+use crate::describe::describe;
 use crate::heap::Kind;
 use crate::run;
 use crate::task::TaskIndex;
@@ -32,6 +34,8 @@ pub(super) fn check_state(vm: &mut Vm, checks: Value) -> bool {
     while !vm.scheduler.deliveries.is_empty() {
         run::deliver_some(vm);
     }
+    // What the conditions read is not part of a schedule.
+    let uses = vm.scheduler.points.uses.take();
     let grain = vm.scheduler.points.grain.take();
     let slice = std::mem::replace(&mut vm.config.slice, CHECK_SLICE);
     let mut turns = 0;
@@ -41,6 +45,23 @@ pub(super) fn check_state(vm: &mut Vm, checks: Value) -> bool {
         run::give_turn(vm, index, u64::MAX);
         turns += 1;
     }
-    (vm.scheduler.points.grain, vm.config.slice) = (grain, slice);
+    (vm.scheduler.points.grain, vm.scheduler.points.uses, vm.config.slice) = (grain, uses, slice);
     turns < CHECK_TURNS
+}
+
+impl Vm {
+    /// Returns the name of the condition of `eventually` or `leads-to` with this number, as the program stands.
+    pub fn name_of_condition(&mut self, number: u32) -> Option<String> {
+        let variable = self.names.intern_esl(&mut self.heap, "*%CONDITIONS*").ok()?;
+        let mut rest = self.heap.symbol(variable)?.value;
+        while let Some(pair) = self.heap.as_cons(rest) {
+            let condition = self.heap.as_cons(pair.car)?;
+            let bit = self.heap.as_cons(condition.cdr)?.car;
+            if bit.as_fixnum() == 1_i64.checked_shl(number) {
+                return Some(describe(&self.heap, condition.car));
+            }
+            rest = pair.cdr;
+        }
+        None
+    }
 }

@@ -17,7 +17,7 @@
 //! Source: Lipton 1975 for actions that commute; Musuvathi and Qadeer 2007 for looking for races in the runs
 //! of a search that relies on their absence.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use esl_bytecode::symbol::Symbol;
 
@@ -25,6 +25,7 @@ use super::Settings;
 use super::digest::Digest;
 use crate::fused::unfused;
 use crate::interp::frames::Frames;
+use crate::names::load::image_origin;
 use crate::task::TaskIndex;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -36,15 +37,42 @@ pub(super) struct TickPlace(u64);
 
 impl TickPlace {
     /// Returns the place at which a task stands.
-    pub(super) fn of(vm: &Vm, index: TaskIndex) -> TickPlace {
+    pub(super) fn of(vm: &Vm, index: TaskIndex, codes: &mut CodeDigests) -> TickPlace {
         let frame = vm.scheduler.tasks.at(index).and_then(|task| Frames::of_task(task).next());
         let Some(frame) = frame else { return TickPlace(0) };
-        let code = vm.heap.function_code(frame.function);
         let mut digest = Digest::default();
         digest.add(frame.word as u64);
-        let words = unfused(code.and_then(|code| vm.heap.code_words(code)).unwrap_or_default());
-        digest.add_all(words.into_iter().map(u64::from));
+        digest.add(codes.of(vm, frame.function));
         TickPlace(digest.0)
+    }
+}
+
+/// Digests of the codes of the program's functions, by their addresses in the course of a run: the next run
+/// may have other codes there. Those of the library have numbers.
+#[derive(Debug, Default)]
+pub(super) struct CodeDigests {
+    known: HashMap<u64, u64>,
+    /// The collector's cycle in which the addresses are good.
+    cycle: u64,
+}
+
+impl CodeDigests {
+    fn of(&mut self, vm: &Vm, function: Value) -> u64 {
+        let mut digest = Digest::default();
+        if let Some((image, number)) = image_origin(&vm.heap, function) {
+            digest.add_all([image as u64, u64::from(number)].into_iter());
+            return digest.0;
+        }
+        let Some(code) = vm.heap.function_code(function) else { return 0 };
+        if self.cycle != vm.heap.cycle_id() {
+            self.cycle = vm.heap.cycle_id();
+            self.known.clear();
+        }
+        *self.known.entry(code.bits()).or_insert_with(|| {
+            let words = unfused(vm.heap.code_words(code).unwrap_or_default());
+            digest.add_all(words.into_iter().map(u64::from));
+            digest.0
+        })
     }
 }
 
@@ -86,12 +114,13 @@ impl ShownPoints {
 pub(super) struct LeftOut<'a> {
     pub(super) needed: &'a NeededPoints,
     pub(super) shown: ShownPoints,
+    pub(super) codes: CodeDigests,
 }
 
 impl<'a> LeftOut<'a> {
     /// Creates the notes of a run, in a search that knows what is needed.
     pub(super) fn new(needed: &'a NeededPoints) -> LeftOut<'a> {
-        LeftOut { needed, shown: ShownPoints::default() }
+        LeftOut { needed, shown: ShownPoints::default(), codes: CodeDigests::default() }
     }
 
     /// Takes from the machine which variables it has found to be in a race.

@@ -67,6 +67,8 @@ pub(super) struct StateGraph<'a> {
     starts: Vec<u32>,
     /// Whether timers may end at any point, which is a choice then.
     has_timers: bool,
+    /// Whether only fair cycles count.
+    is_fair: bool,
     /// The part to which each state belongs; 0 for those left out.
     parts: Vec<u32>,
 }
@@ -76,7 +78,7 @@ impl<'a> StateGraph<'a> {
     pub(super) fn new(
         tasks: &'a [StateTasks],
         steps: &[StateStep],
-        has_timers: bool,
+        (has_timers, is_fair): (bool, bool),
         is_out: impl Fn(u32) -> bool,
     ) -> StateGraph<'a> {
         let stays = |step: &&StateStep| step.cause.keeps_tasks && !is_out(step.from) && !is_out(step.to);
@@ -87,7 +89,7 @@ impl<'a> StateGraph<'a> {
         for state in 0..tasks.len() {
             starts[state + 1] += starts[state];
         }
-        StateGraph { tasks, steps: kept, starts, has_timers, parts: vec![1; tasks.len()] }
+        StateGraph { tasks, steps: kept, starts, has_timers, is_fair, parts: vec![1; tasks.len()] }
     }
 
     fn steps_from(&self, state: u32) -> &[StateStep] {
@@ -100,7 +102,7 @@ impl<'a> StateGraph<'a> {
         self.steps_from(state).iter().filter(move |step| self.parts[step.to as usize] == part).copied()
     }
 
-    /// Returns the first fair way round.
+    /// Returns the first fair way round; the first one of all, if they need not be fair.
     pub(super) fn fair_lap(&mut self) -> Option<FairLap> {
         let mut number = 1;
         let mut open: VecDeque<Vec<u32>> = VecDeque::from([(0..self.tasks.len() as u32).collect()]);
@@ -110,6 +112,9 @@ impl<'a> StateGraph<'a> {
                 part.iter().for_each(|&state| self.parts[state as usize] = number);
                 if part.iter().all(|&state| self.inner_steps(state).next().is_none()) {
                     continue;
+                }
+                if !self.is_fair {
+                    return self.shortest_lap(&part);
                 }
                 let leaves = |state: u32| {
                     let ways = self.tasks[state as usize].ways;
@@ -182,6 +187,13 @@ impl<'a> StateGraph<'a> {
             }
         }
         found
+    }
+
+    /// Returns a shortest way round from the first state of a part.
+    fn shortest_lap(&self, part: &[u32]) -> Option<FairLap> {
+        let state = *part.iter().min()?;
+        let lap = self.way_to(state, &|step| step.to == state)?;
+        Some(FairLap { state, choices: self.choices_of(state, &lap) })
     }
 
     /// Returns a fair way round in a part, if the way through all of it is fair.
@@ -283,7 +295,11 @@ mod tests {
     }
 
     fn lap(tasks: &[StateTasks], steps: &[StateStep]) -> Option<FairLap> {
-        StateGraph::new(tasks, steps, false, |_| false).fair_lap()
+        StateGraph::new(tasks, steps, (false, true), |_| false).fair_lap()
+    }
+
+    fn any_lap(tasks: &[StateTasks], steps: &[StateStep]) -> Option<FairLap> {
+        StateGraph::new(tasks, steps, (false, false), |_| false).fair_lap()
     }
 
     #[test]
@@ -295,6 +311,8 @@ mod tests {
         // One of them alone, while the other one could go on.
         let one = [step(0, 1, 0), step(1, 0, 0), step(1, 2, 1)];
         assert_eq!(lap(&tasks, &one), None);
+        assert_eq!(any_lap(&tasks, &one), Some(FairLap { state: 0, choices: vec![0, 0] }));
+        assert_eq!(any_lap(&tasks, &one[..1]), None);
         // The other one waits somewhere.
         let tasks = [state(0b11), state(0b01), state(0b11)];
         assert_eq!(lap(&tasks, &one), Some(FairLap { state: 0, choices: vec![0] }));

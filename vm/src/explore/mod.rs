@@ -7,7 +7,7 @@
 //! fingerprint   telling states apart           content  visiting the fields that belong to a state
 //! digest        hashes of states               numbers  objects in the order in which they are met
 //! live          which registers of a frame belong to a state
-//! search        the tree of choices, and the states found
+//! search        the tree of choices, and the states found     set       the states, by fingerprint
 //! trace         one run of the search, and taking in what it has come by
 //! worker        this thread, or several, among which the runs are divided
 //! keep          returning to places of that tree
@@ -68,6 +68,7 @@ mod numbers;
 mod point;
 mod random;
 mod search;
+mod set;
 mod step;
 #[cfg(test)]
 mod tests;
@@ -116,6 +117,17 @@ impl TimerGrain {
     }
 }
 
+/// The schedules without an end that count as findings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Fairness {
+    /// Those that are fair: each task that could go on all along goes on at some time, time passes if it
+    /// could all along, and each alternative of a `choose` is taken. The machine's own scheduler is fair.
+    #[default]
+    Weak,
+    /// All.
+    None,
+}
+
 /// Settings of an exploration.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -150,6 +162,8 @@ pub struct Settings {
     pub clock: bool,
     /// Whether states also differ by how often each event was signalled, because the program counts signals.
     pub counts: bool,
+    /// Which schedules without an end count.
+    pub fairness: Fairness,
 }
 
 impl Default for Settings {
@@ -168,6 +182,7 @@ impl Default for Settings {
             reduce: true,
             clock: false,
             counts: false,
+            fairness: Fairness::Weak,
         }
     }
 }
@@ -207,13 +222,16 @@ pub struct Exploration<T> {
     /// A schedule that goes on for ever though it is fair to all tasks, beside those that lead to a state of
     /// `endless`, if there is one.
     pub livelock: Option<Livelock>,
+    /// The conditions of `eventually` and `leads-to` that never become true on a schedule that goes on for
+    /// ever. Schedules that end without them have an ending of their own.
+    pub unmet: Vec<UnmetCondition>,
     /// Whether a schedule returns to a state: then it can go on for ever, if only by treating tasks unfairly.
     pub has_cycle: bool,
     /// The limit that kept the search from trying everything, if one did.
     pub limit: Option<SearchLimit>,
 }
 
-/// A schedule that returns to a state on a fair path: each task that could go on all along has gone
+/// A schedule that returns to a state. If it has to be fair, each task that could go on all along has gone
 /// on, and time has passed if it could.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Livelock {
@@ -221,6 +239,15 @@ pub struct Livelock {
     pub choices: Vec<u32>,
     /// Number of the first choice on the path back.
     pub lap: usize,
+}
+
+/// A condition that is to become true, and a schedule that goes on for ever without it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnmetCondition {
+    /// Its number, from which [`Vm::name_of_condition`] returns its name at the end of the schedule.
+    pub condition: u32,
+    /// The schedule. The condition is false in all states of the cycle.
+    pub schedule: Livelock,
 }
 
 /// A limit that keeps a search from trying everything.
@@ -458,11 +485,7 @@ fn search_by<T: PartialEq + Clone, E>(
     let stuck = ends.iter().position(|ends| !ends);
     let endless = stuck.map(|state| search.choices_to_state(state as u32));
     let (states, has_cycle) = (search.states.len(), search.has_cycle());
-    let has_timers = settings.timers == TimerGrain::Any;
-    let lap = if has_cycle { search.fair_lap(has_timers, |state| !ends[state as usize]) } else { None };
-    let livelock = lap.map(|lap| {
-        let before = search.choices_to_state(lap.state);
-        Livelock { lap: before.len(), choices: [before, lap.choices].concat() }
-    });
-    Ok(Ok(Exploration { states, runs, endings, endless, livelock, has_cycle, limit }))
+    let livelock = if has_cycle { search.livelock(settings, &ends) } else { None };
+    let unmet = if has_cycle { search.unmet(settings) } else { Vec::new() };
+    Ok(Ok(Exploration { states, runs, endings, endless, livelock, unmet, has_cycle, limit }))
 }

@@ -154,6 +154,8 @@ pub(super) struct PointRun {
     last: TaskNumber,
     /// Variable with the event for which the task waits that checks each state.
     checks: Value,
+    /// Variable with the bits of the conditions that are still to become true.
+    pending: Value,
     /// Whether the machine stands at a point, where the next choice is made.
     is_at_point: bool,
     /// Whether timers may fire while tasks can run.
@@ -202,10 +204,12 @@ pub(super) type Choose<'a> = dyn FnMut(&mut Vm, PointRun, Runnable<'_>) -> Optio
 impl PointRun {
     /// Begins to run a program from its beginning.
     pub(super) fn begin(vm: &mut Vm, settings: &Settings) -> PointRun {
-        let checks = vm.names.intern_esl(&mut vm.heap, "*%EXPLORED-STATE*").unwrap_or(Value::NIL);
+        let mut variable = |name| vm.names.intern_esl(&mut vm.heap, name).unwrap_or(Value::NIL);
+        let (checks, pending) = (variable("*%EXPLORED-STATE*"), variable("*%PENDING*"));
         PointRun {
             last: TaskNumber(u64::MAX),
             checks,
+            pending,
             is_at_point: false,
             has_timers: settings.timers == TimerGrain::Any,
             unseen: (settings.grain == Grain::Variables).then_some(UnseenWay {
@@ -224,6 +228,12 @@ impl PointRun {
     /// first choice leads here.
     pub(super) fn skipped(&self) -> u32 {
         self.skipped
+    }
+
+    /// Returns the bits of the conditions that are still to become true in the state of a machine.
+    pub(super) fn pending(&self, vm: &Vm) -> u64 {
+        let bits = vm.heap.symbol(self.pending).and_then(|symbol| symbol.value.as_fixnum());
+        bits.and_then(|bits| u64::try_from(bits).ok()).unwrap_or(0)
     }
 
     /// Returns the task that ran last.
@@ -374,7 +384,7 @@ impl PointRun {
         }
         match left_out {
             Some(left_out) if is_seen => {
-                let place = TickPlace::of(vm, index);
+                let place = TickPlace::of(vm, index, &mut left_out.codes);
                 if left_out.needed.places.contains(&place) {
                     return None;
                 }

@@ -1,10 +1,10 @@
 //! The state of a search: the tree of choices that were made, those to be made, and the states found.
 
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 
-use super::SearchProgress;
-use super::livelock::{FairLap, StateGraph, StateStep, StateTasks};
+use super::livelock::{StateGraph, StateStep, StateTasks};
+use super::set::StateSet;
+use super::{Fairness, Livelock, SearchProgress, Settings, TimerGrain, UnmetCondition};
 
 /// A choice at a point.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,12 +36,14 @@ pub(super) struct Search {
     pub(super) nodes: Vec<ChoiceNode>,
     /// Nodes to continue from, by number of preemptions; the latest is last.
     open: Vec<Vec<u32>>,
-    /// Numbers of states, by fingerprint.
-    pub(super) states: HashMap<u128, u32>,
+    /// The states found so far.
+    pub(super) states: StateSet,
     /// Node from which each state was reached first.
     pub(super) places: Vec<u32>,
     /// The tasks in each state.
     pub(super) tasks: Vec<StateTasks>,
+    /// The bits of the conditions that are still to become true in each state; states behind have none.
+    pending: Vec<u64>,
     /// Steps between states.
     pub(super) steps: Vec<StateStep>,
     /// States from which a step leads to the end.
@@ -108,14 +110,19 @@ impl Search {
     /// Returns the number of the state with this fingerprint, and whether it is new; then it was reached
     /// first from this node.
     pub(super) fn state(&mut self, fingerprint: u128, node: u32, tasks: StateTasks) -> (u32, bool) {
-        let next = self.places.len() as u32;
-        match self.states.entry(fingerprint) {
-            Entry::Occupied(known) => (*known.get(), false),
-            Entry::Vacant(free) => {
-                self.places.push(node);
-                self.tasks.push(tasks);
-                (*free.insert(next), true)
-            }
+        let (state, is_new) = self.states.insert(fingerprint);
+        if is_new {
+            self.places.push(node);
+            self.tasks.push(tasks);
+        }
+        (state, is_new)
+    }
+
+    /// Notes which conditions are still to become true in a state, by their bits.
+    pub(super) fn note_pending(&mut self, state: u32, conditions: u64) {
+        if conditions != 0 {
+            self.pending.resize(state as usize, 0);
+            self.pending.push(conditions);
         }
     }
 
@@ -124,9 +131,10 @@ impl Search {
         let open = self.open.iter().map(Vec::capacity).sum::<usize>();
         let numbers = open + self.places.capacity() + self.last.capacity();
         self.nodes.capacity() * size_of::<ChoiceNode>()
-            + self.states.capacity() * (size_of::<(u128, u32)>() + 1)
+            + self.states.bytes()
             + self.tasks.capacity() * size_of::<StateTasks>()
             + self.steps.capacity() * size_of::<StateStep>()
+            + self.pending.capacity() * size_of::<u64>()
             + numbers * size_of::<u32>()
     }
 
@@ -185,9 +193,30 @@ impl Search {
         ends
     }
 
-    /// Returns a fair way round among the states of which `is_out` is false.
-    pub(super) fn fair_lap(&self, has_timers: bool, is_out: impl Fn(u32) -> bool) -> Option<FairLap> {
-        StateGraph::new(&self.tasks, &self.steps, has_timers, is_out).fair_lap()
+    /// Returns a schedule that goes on for ever, and is fair as far as the settings want, through states of
+    /// which `is_out` is false.
+    fn lap(&self, settings: &Settings, is_out: impl Fn(u32) -> bool) -> Option<Livelock> {
+        let (has_timers, is_fair) = (settings.timers == TimerGrain::Any, settings.fairness == Fairness::Weak);
+        let lap = StateGraph::new(&self.tasks, &self.steps, (has_timers, is_fair), is_out).fair_lap()?;
+        let before = self.choices_to_state(lap.state);
+        Some(Livelock { lap: before.len(), choices: [before, lap.choices].concat() })
+    }
+
+    /// Returns a schedule that goes on for ever, beside states from which none leads to an end.
+    pub(super) fn livelock(&self, settings: &Settings, ends: &[bool]) -> Option<Livelock> {
+        self.lap(settings, |state| !ends[state as usize])
+    }
+
+    /// Returns the conditions that are to become true, and never do on a schedule that goes on for ever.
+    pub(super) fn unmet(&self, settings: &Settings) -> Vec<UnmetCondition> {
+        let all = self.pending.iter().fold(0, |all, pending| all | pending);
+        let pending = |state: u32| self.pending.get(state as usize).copied().unwrap_or(0);
+        let conditions = (0..u64::BITS).filter(|number| all >> number & 1 == 1);
+        let unmet = conditions.filter_map(|condition| {
+            let schedule = self.lap(settings, |state| pending(state) >> condition & 1 == 0)?;
+            Some(UnmetCondition { condition, schedule })
+        });
+        unmet.collect()
     }
 
     /// Returns whether steps lead from a state back to it: whether states remain when those without a step to

@@ -30,6 +30,8 @@ pub(super) struct TraceStep {
     pub(super) has_ways: bool,
     /// The tasks there.
     pub(super) tasks: StateTasks,
+    /// The bits of the conditions that are still to become true.
+    pub(super) pending: u64,
     /// The cause of the step to it.
     pub(super) cause: StepCause,
 }
@@ -176,8 +178,9 @@ impl<'a, S: Subject> Tracer<'a, S> {
             let unknown = StepCause { ran: NO_TASK, way: 0, keeps_tasks: false };
             let cause = before.as_ref().map_or(unknown, |before| before.cause(&here.numbers, run.last()));
             before = Some(here);
-            steps.push(TraceStep { state, count, has_last, has_ways: runnable.ways.is_some(), tasks, cause });
-            end = if search.states.contains_key(&state) {
+            let (has_ways, pending) = (runnable.ways.is_some(), run.pending(vm));
+            steps.push(TraceStep { state, count, has_last, has_ways, tasks, pending, cause });
+            end = if search.states.contains(state) {
                 TraceEnd::Known
             } else if let Some(step) = claims.claim((state, run.last()), (number, steps.len() - 1)) {
                 TraceEnd::Joined(step)
@@ -250,6 +253,7 @@ impl Merging<'_> {
             if !is_new {
                 return Merged::Known;
             }
+            search.note_pending(state, step.pending);
             place.before = Some(state);
             if search.places.len() >= self.settings.states {
                 *self.limit = Some(SearchLimit::States);

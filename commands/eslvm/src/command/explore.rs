@@ -9,7 +9,7 @@ use esl_command::{NOT_COMPILED, ProgramFile};
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_testing::explore;
 
-use super::options::{ExploreArguments, GrainChoice, TimersChoice};
+use super::options::{ExploreArguments, FairnessChoice, GrainChoice, TimersChoice};
 use super::processors;
 use super::program::compiling;
 use crate::explore::{ExplorationOptions, run};
@@ -56,6 +56,10 @@ pub(crate) fn run_explore(
         switches: options.switches,
         faults: options.faults,
         output: false,
+        fairness: match options.fairness {
+            FairnessChoice::Weak => explore::Fairness::Weak,
+            FairnessChoice::None => explore::Fairness::None,
+        },
         ..explore::Settings::default()
     };
     let with_points = || {
@@ -72,11 +76,13 @@ pub(crate) fn run_explore(
         jobs,
     });
     let (strict, deny_fragile) = (options.strict || !options.deny.is_empty(), !options.deny.is_empty());
+    let is_endless = options.endless;
     let options = ExplorationOptions {
         settings,
         grain,
         jobs,
         time,
+        is_endless,
         timeline,
         strict,
         deny_fragile,

@@ -384,6 +384,13 @@ pub(crate) struct ExploreArguments {
     /// Most switches of a schedule: points at which a task that could go on lets another one go first
     #[arg(long, value_name = "N")]
     pub(crate) switches: Option<usize>,
+    /// Which schedules without an end are findings: those that are fair to each task, or all
+    #[arg(long, value_enum, default_value = "weak")]
+    pub(crate) fairness: FairnessChoice,
+    /// The program is meant to go on for ever: of schedules without an end, only those are findings on which a
+    /// condition of EVENTUALLY or LEADS-TO never comes true
+    #[arg(long, conflicts_with = "random")]
+    pub(crate) endless: bool,
     /// Also look for updates that are safe only because no call stands between a read and a write: fragile
     /// ones
     #[arg(long, conflicts_with = "random")]
@@ -424,6 +431,15 @@ pub(crate) enum GrainChoice {
     Variables,
     /// At every tick, which is wherever the machine can preempt it
     Ticks,
+}
+
+/// The schedules without an end that are findings.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum FairnessChoice {
+    /// Those on which each task that could go on all along goes on, and time passes if it could all along
+    Weak,
+    /// All, those too on which a task that could go on never does
+    None,
 }
 
 /// When timers end.

@@ -13,9 +13,9 @@ use esl::program::Schedule;
 use esl::program::{Ended, Program};
 use esl_command::{FAILED, NOT_PROVED, SUCCESS, StatusLine, USAGE, complain, say};
 use esl_testing::explore::{
-    Behaviour, Exploration, ExplorationScope, ExploredEnding, Grain, Livelock, Prepare, RandomSettings,
-    ScheduleEvent, ScheduleStep, SearchLimit, SearchProgress, Settings, SourceForms, TimerGrain,
-    explore_together, grains, shortest, tell_steps,
+    Behaviour, Exploration, ExplorationScope, ExploredEnding, Fairness, Grain, Livelock, Prepare,
+    RandomSettings, ScheduleEvent, ScheduleStep, SearchLimit, SearchProgress, Settings, SourceForms,
+    TimerGrain, explore_together, grains, name_of_condition, shortest, tell_steps,
 };
 use esl_timeline::Timeline;
 use esl_vm::vm::Vm;
@@ -36,6 +36,8 @@ pub struct ExplorationOptions {
     pub jobs: usize,
     /// Time after which the search gives up.
     pub time: Duration,
+    /// Whether the program is meant to go on for ever: then a schedule without an end is no finding by itself.
+    pub is_endless: bool,
     /// File for a timeline of the first finding.
     pub timeline: Option<PathBuf>,
     /// Whether uses of shared places that are safe by chance only are looked for, too.
@@ -137,7 +139,16 @@ impl CommandExploration<'_> {
         if self.options.json {
             self.say_figures(&searched);
         } else {
-            print_summary(scope, tried, found.has_cycle, findings.len());
+            let cycle = if !found.has_cycle {
+                None
+            } else if self.options.is_endless {
+                Some("schedules that go on for ever, other than by conditions (--endless)")
+            } else if settings.fairness == Fairness::Weak {
+                Some("schedules that are unfair to a task, which may go on for ever")
+            } else {
+                None
+            };
+            print_summary(scope, tried, cycle, findings.len());
         }
         let is_fragile = self.options.strict && !has_findings && self.try_strictly()?;
         Ok(match (has_findings, is_complete) {
@@ -161,13 +172,51 @@ impl CommandExploration<'_> {
             let settings = Settings { grain, strict, ..self.options.settings };
             let found = self.search(program, &settings).map_err(TellError::Program)?;
             let scope = ExplorationScope::new(self.program, &settings, &found);
-            let findings = findings(&found.endings, found.endless.as_ref(), found.livelock.as_ref());
+            let mut findings = findings(&found.endings);
+            findings.extend(self.endless_findings(program, &settings, &found).map_err(TellError::Program)?);
             let is_last = tried.len() + 1 == grains.len();
             if is_last || !findings.is_empty() || found.limit.is_some() {
                 return Ok(Searched { settings, scope, tried, found, findings });
             }
             tried.push(scope);
         }
+    }
+
+    /// Returns the schedules that go on for ever and should not.
+    ///
+    /// # Errors
+    /// As [`name_of_condition`].
+    fn endless_findings(
+        &self,
+        program: &Program,
+        settings: &Settings,
+        found: &Exploration<Behaviour>,
+    ) -> Result<Vec<Finding>, Error> {
+        let how = match settings.fairness {
+            Fairness::Weak => "though each has its turns",
+            Fairness::None => "if the schedule may be unfair",
+        };
+        let finding = |what: String, Livelock { choices, lap }: &Livelock| {
+            let repeated = choices[*lap..].iter().filter(|&&choice| choice > 0).count();
+            Finding { what, choices: choices.clone(), ends: false, repeated, errors: String::new() }
+        };
+        let mut findings = Vec::new();
+        for unmet in &found.unmet {
+            let name = name_of_condition(program, settings, unmet, self.prepare)?;
+            let what = format!("{name} never comes true while tasks go on for ever, {how}");
+            findings.push(finding(what, &unmet.schedule));
+        }
+        if self.options.is_endless {
+            return Ok(findings);
+        }
+        if let Some(choices) = &found.endless {
+            let (what, choices) = ("from here on, the program never ends".into(), choices.clone());
+            findings.push(Finding { what, choices, ends: false, repeated: 0, errors: String::new() });
+        }
+        if let Some(livelock) = &found.livelock {
+            findings.push(finding(format!("tasks can go on for ever, {how}"), livelock));
+        }
+        Ok(findings)
     }
 
     /// Explores a program with these settings, and tells a terminal how far it is.
@@ -206,11 +255,13 @@ impl CommandExploration<'_> {
         let unseen: Vec<String> = scope.unseen.iter().map(ToString::to_string).collect();
         let (grain, timers) = (scope.grain.name(), scope.timers.name());
         let (states, runs, count) = (found.states, found.runs, findings.len());
+        let fairness = self.options.settings.fairness;
         say!(
             "{}",
             json!({
                 "verdict": verdict, "grain": grain, "timers": timers, "unseen": unseen, "states": states,
-                "runs": runs, "findings": count, "limit": limit,
+                "runs": runs, "findings": count, "limit": limit, "endless": self.options.is_endless,
+                "fairness": if fairness == Fairness::Weak { "weak" } else { "none" },
                 "seconds": self.started.elapsed().as_secs_f64(),
             })
         );
@@ -291,11 +342,7 @@ impl CommandExploration<'_> {
 }
 
 /// Returns the ways in which runs end badly, the one with the fewest switches first.
-fn findings(
-    endings: &[ExploredEnding<Behaviour>],
-    endless: Option<&Vec<u32>>,
-    livelock: Option<&Livelock>,
-) -> Vec<Finding> {
+fn findings(endings: &[ExploredEnding<Behaviour>]) -> Vec<Finding> {
     let mut findings: Vec<Finding> = Vec::new();
     for ending in endings {
         let Behaviour { ended, errors, .. } = &ending.what;
@@ -318,17 +365,6 @@ fn findings(
                 errors: errors.clone(),
             });
         }
-    }
-    if let Some(choices) = endless {
-        let what = "from here on, the program never ends".into();
-        let choices = choices.clone();
-        findings.push(Finding { what, choices, ends: false, repeated: 0, errors: String::new() });
-    }
-    if let Some(Livelock { choices, lap }) = livelock {
-        let what = "tasks can go on for ever, though each has its turns".into();
-        let repeated = choices[*lap..].iter().filter(|&&choice| choice > 0).count();
-        let choices = choices.clone();
-        findings.push(Finding { what, choices, ends: false, repeated, errors: String::new() });
     }
     findings
 }
@@ -364,8 +400,8 @@ impl fmt::Display for TellError {
 }
 
 /// Prints the verdict, and in a line what was not tried. `tried` are the scopes at coarser grains, at which
-/// nothing was found.
-fn print_summary(scope: &ExplorationScope, tried: &[ExplorationScope], has_cycle: bool, findings: usize) {
+/// nothing was found; `cycle` says which schedules that go on for ever are left out.
+fn print_summary(scope: &ExplorationScope, tried: &[ExplorationScope], cycle: Option<&str>, findings: usize) {
     match (findings, scope.why_not_complete()) {
         (0, None) => say!("complete: no schedule ends badly ({scope})"),
         (0, Some(why)) => say!("bounded, not proved: {why}; no schedule so far ends badly ({scope})"),
@@ -381,7 +417,6 @@ fn print_summary(scope: &ExplorationScope, tried: &[ExplorationScope], has_cycle
         say!("all schedules at grain {} were tried before ({coarser}), but {why}", coarser.grain.name());
     }
     let timers = (scope.timers == TimerGrain::Idle).then_some("timers that end early (--timers any)");
-    let cycle = has_cycle.then_some("schedules that are unfair to a task, which may go on for ever");
     let left: Vec<&str> = [timers, cycle].into_iter().flatten().collect();
     if !left.is_empty() {
         say!("not tried: {}", left.join("; "));

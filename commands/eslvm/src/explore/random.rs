@@ -27,7 +27,7 @@ impl CommandExploration<'_> {
         let line = || format!("{} of {} random schedules", done.load(Ordering::Relaxed), random.count);
         let found =
             StatusLine::new(self.options.is_quiet).during(line, search).map_err(TellError::Program)?;
-        let findings = findings(&found.endings, None, None);
+        let findings = findings(&found.endings);
         for (finding, number) in findings.iter().zip(1..) {
             self.tell((self.program, &settings), finding, &format!("finding {number}"), number)?;
         }

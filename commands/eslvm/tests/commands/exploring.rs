@@ -373,7 +373,36 @@ fn the_manual_shows_what_is_found() {
         assert!(output.starts_with(shown), "{output}\n{shown}");
         tried += 1;
     }
-    assert_eq!(tried, 3);
+    assert_eq!(tried, 4);
+}
+
+#[test]
+fn a_program_that_goes_on_for_ever_is_judged_by_its_conditions() {
+    let folder = Folder::new("exploring-endless");
+    folder.file(
+        "lamp.esl",
+        "(defvar *lamp* nil)
+(leads-to lit (not *lamp*) *lamp*)
+(task-net (off (loop (setq *lamp* nil) (sleep 0)))
+          (on (loop (setq *lamp* t) (sleep 0))))
+",
+    );
+    let explore = |options: &[&str]| {
+        let (status, output, errors) = run(&folder, &[&["explore", "lamp.esl"], options].concat());
+        assert_eq!(errors, "", "{output}");
+        (status, output)
+    };
+    let (status, output) = explore(&["--endless"]);
+    assert_eq!(status, Some(0), "{output}");
+    assert!(output.starts_with("complete: ") && output.contains("(--endless)"), "{output}");
+    let (status, output) = explore(&[]);
+    assert_eq!(status, Some(1), "{output}");
+    assert!(output.starts_with("finding 1: from here on, the program never ends"), "{output}");
+    let (status, output) = explore(&["--endless", "--fairness", "none"]);
+    assert_eq!(status, Some(1), "{output}");
+    let expected =
+        "finding 1: LIT never comes true while tasks go on for ever, if the schedule may be unfair\n";
+    assert!(output.starts_with(expected), "{output}");
 }
 
 #[test]

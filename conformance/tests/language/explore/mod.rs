@@ -7,6 +7,7 @@ mod everywhere;
 mod fluents;
 mod generated;
 mod keeping;
+mod liveness;
 mod oracle;
 mod origins;
 mod putting_back;
