@@ -39,6 +39,7 @@ pub const MODULES: &[HostModule] = &[
         text: include_str!("../modules/plans-network.esl"),
         rows: HostRows::new,
     },
+    HostModule { name: "plans-order", text: include_str!("../modules/plans-order.esl"), rows: HostRows::new },
     HostModule {
         name: "plans-picture",
         text: include_str!("../modules/plans-picture.esl"),

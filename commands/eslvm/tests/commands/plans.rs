@@ -3,6 +3,7 @@
 //! schedules.
 
 use std::path::PathBuf;
+use std::process::Command;
 
 use esl_conformance::folder::Folder;
 use esl_conformance::{Expectations, process};
@@ -26,6 +27,8 @@ mod programs {
         no_duration_breaks_a_controllable_plan =
             "no_duration_breaks_a_controllable_plan.esl",
         pictures_show_times_and_windows = "pictures_show_times_and_windows.esl",
+        points_at_the_same_time_are_executed =
+            "points_at_the_same_time_are_executed.esl",
         policies_choose_the_time_in_a_window = "policies_choose_the_time_in_a_window.esl",
         windows_are_those_of_bellman_ford = "windows_are_those_of_bellman_ford.esl",
     }
@@ -95,6 +98,24 @@ fn a_broken_plan_is_made_anew_by_a_planner() {
     check_with_planner("replanned", "tamer");
 }
 
+/// Plans that engines have found for the test problems of unified-planning are executed.
+#[test]
+fn plans_of_test_problems_reach_their_goals() {
+    let Some(python) = venv::python("planners", &PLANNERS, "import unified_planning, up_aries, up_tamer")
+    else {
+        return;
+    };
+    listed::run("plans/tests/planners/problems.esl", |path, text| {
+        let expected = Expectations::parse(text).map_err(|fault| fault.to_string())?;
+        let path = esl_conformance::root().join(path);
+        let solved = process::run(Command::new(python).arg(path.with_extension("py")), "");
+        let run = process::run(eslvm(&["run", "--clock", "virtual"]).arg(&path), &solved.output);
+        let lines: Vec<&str> = run.output.lines().filter(|line| !line.is_empty()).collect();
+        let found = format!("{}\n{}\n{}", run.output, run.errors, solved.errors);
+        if run.status == Some(0) && lines == expected.output { Ok(()) } else { Err(found) }
+    });
+}
+
 /// Explores a program, and compares the beginning of the verdict.
 fn check_explored(name: &str, options: &[&str], verdict: &str) {
     let path = esl_conformance::root().join(format!("plans/tests/explored/{name}.esl"));
@@ -111,6 +132,12 @@ fn nothing_begins_twice_in_any_schedule_with_failures() {
 #[test]
 fn nothing_is_left_by_an_abort_in_any_schedule() {
     check_explored("aborts", &["--grain", "changes"], "grain ticks does; no schedule so far ends badly");
+}
+
+#[test]
+fn nothing_is_left_in_random_schedules_of_three_activities_with_failures_and_aborts() {
+    // All schedules at the grain `changes`, 49,326 states, take half a minute.
+    check_explored("failures_and_aborts", &["--random", "40"], "no random schedule ends badly");
 }
 
 #[test]
