@@ -6,6 +6,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod lease_clock;
 pub mod mavlink;
 pub mod mcap;
 pub mod message;
@@ -24,7 +25,11 @@ pub const MODULES: &[HostModule] = &[
         text: include_str!("../modules/fleet-auctions.esl"),
         rows: HostRows::new,
     },
-    HostModule { name: "fleet-etcd", text: include_str!("../modules/fleet-etcd.esl"), rows: HostRows::new },
+    HostModule {
+        name: "fleet-etcd",
+        text: include_str!("../modules/fleet-etcd.esl"),
+        rows: lease_clock::rows,
+    },
     HostModule { name: "fleet-facts", text: include_str!("../modules/fleet-facts.esl"), rows: HostRows::new },
     HostModule {
         name: "fleet-leases",
