@@ -2,14 +2,14 @@
 
     problems.py [NAME...]
 
-Each line that begins with a parenthesis is a list (NAME FORMS FACTS GOALS PATTERNS ENTRIES CONSTRAINTS STEPS): forms that define
-activities and properties; the facts at the beginning; forms that are true in the end; patterns of all facts; entries and constraints of a plan
-for the events and deadlines of the problem, and for a schedule; and the steps of the planner's plan, as `solve-with`
-returns them. Any other line names a problem that no engine here solves, with the reason. Fluents that are not boolean
-are properties. An effect that needs a computation is in the body of its activity, where `(touched FLUENT)` tells that
-the fluent changes. Activities have the names of actions after `do-`.
+Each line that begins with a parenthesis is a list (NAME FORMS FACTS GOALS PATTERNS ENTRIES CONSTRAINTS STEPS):
+forms that define activities and properties; the facts at the beginning; forms that are true in the end;
+patterns of all facts; entries and constraints of a plan for the events and deadlines of the problem, and for a
+schedule; and the steps of the planner's plan, as `solve-with` returns them. Any other line names a problem that
+no engine here solves, with the reason. Fluents that are not boolean are properties. An effect that needs a
+computation is in the body of its activity, where `(touched FLUENT)` tells that the fluent changes. Activities
+have the names of actions after `do-`.
 """
-import subprocess
 import sys
 from fractions import Fraction
 
@@ -17,9 +17,9 @@ from unified_planning.model.scheduling import SchedulingProblem
 from unified_planning.shortcuts import InstantaneousAction, OneshotPlanner, get_environment
 from unified_planning.test.examples import get_example_problems
 
-# Aries does not take durations that depend on arguments, and takes conditional effects for unconditional ones. In tamer's
-# plan for `logistic`, two robots come to one place at the same moment, each on the condition that the other is not there.
-# `None` stands for the plan that comes with the problem.
+# Aries does not take durations that depend on arguments, and takes conditional effects for unconditional
+# ones. In tamer's plan for `logistic`, two robots come to one place at the same moment, each on the condition
+# that the other is not there. `None` stands for the plan that comes with the problem.
 ENGINES = {
     "temporal_conditional": None,
     "robot_with_static_fluents_duration": "tamer",

@@ -247,7 +247,7 @@ fn one_agent_at_a_time_holds_a_resource_by_etcd() {
     let Some(mut store) = start_store("fleet-etcd") else { return };
     let folders = ["fleet-holder-a", "fleet-holder-b"].map(Folder::new);
     let port = store.port.to_string();
-    // Leases end by the time of the store, whatever the speed of the program's clock is.
+    // Leases end by the time of the store at any speed of the program's clock.
     let [mut a, mut b] = [(0, "a", "4"), (1, "b", "0.25")].map(|(number, name, speed)| {
         let holder = start(&folders[number], HOLDER, free_port(), &["--speed", speed], &[name, &port]);
         assert_eq!(holder.line(), ":READY");
