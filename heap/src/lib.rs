@@ -14,6 +14,7 @@
 //! | [`store`] | the state of a machine as bytes |
 //! | [`fork`] | a fork of the process that writes memory to a file |
 //! | [`allocator`] | a setting of the C library's allocator, for commands |
+//! | [`realtime`] | settings of the process and its threads for runs that react in time, for commands |
 //! | [`character`] | case, classes and names of characters |
 //!
 //! Guarantees: safe code cannot break memory safety through this crate, however odd the caller, once the two
@@ -29,6 +30,7 @@ pub mod equality;
 pub mod fork;
 pub mod heap;
 pub mod number;
+pub mod realtime;
 pub mod saved_pc;
 pub mod stack;
 pub mod state;

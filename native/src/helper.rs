@@ -7,6 +7,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
+use esl_heap::realtime;
+
 use crate::maker::{MachineCode, MachineCodeMaker, NativeSource, NotMade};
 
 /// Bytes of the thread's stack.
@@ -41,7 +43,10 @@ impl MachineCodeHelper {
         thread::Builder::new()
             .name("machine code".into())
             .stack_size(STACK)
-            .spawn(move || make_all(&work, &finished))
+            .spawn(move || {
+                realtime::join_below();
+                make_all(&work, &finished);
+            })
             .map_err(|error| NotMade::Unsupported(format!("there is no thread for it: {error}")))?;
         Ok(MachineCodeHelper { orders, made })
     }

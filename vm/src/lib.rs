@@ -2,7 +2,7 @@
 
 #![deny(unsafe_code)]
 
-pub use esl_heap::{allocator, heap, value};
+pub use esl_heap::{allocator, heap, realtime, value};
 
 pub(crate) use esl_heap::{character, equality, saved_pc, stack, table};
 

@@ -192,7 +192,10 @@ impl<F: Stoppable> Wake for BegunFuture<F> {
 fn start() -> io::Result<Handle> {
     let runtime = Builder::new_current_thread().enable_all().build()?;
     let handle = runtime.handle().clone();
-    let run = move || runtime.block_on(std::future::pending::<()>());
+    let run = move || {
+        esl_vm::realtime::join();
+        runtime.block_on(std::future::pending::<()>());
+    };
     std::thread::Builder::new().name("world".into()).spawn(run)?;
     Ok(handle)
 }

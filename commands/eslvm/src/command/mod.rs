@@ -8,6 +8,7 @@ mod host;
 mod injecting;
 mod options;
 mod program;
+mod realtime;
 mod run;
 
 use std::path::Path;
@@ -71,6 +72,7 @@ pub fn main() -> u8 {
             speed,
             stats,
             tier,
+            realtime,
             timeline,
             profile,
             profile_unit,
@@ -96,6 +98,10 @@ pub fn main() -> u8 {
                 command::complain("`--speed` has no effect on the clock of ROS: leave it out");
                 return command::USAGE;
             }
+            if realtime.is_some() && options.clock == ClockChoice::Virtual {
+                command::complain("`--realtime` has no effect on a virtual clock: leave it out");
+                return command::USAGE;
+            }
             let path = ModulePath::new([file.as_path()], &modules.library);
             let rights = options.rights.rights();
             rights.and_then(|rights| {
@@ -105,6 +111,7 @@ pub fn main() -> u8 {
                 let reports = RunReports {
                     stats,
                     tier,
+                    realtime,
                     timeline: timeline.as_deref(),
                     profile: profile.as_deref(),
                     profile_unit,

@@ -79,6 +79,11 @@ pub(crate) enum EslvmAction {
         /// all, and reports that the option has no effect
         #[arg(long, value_enum, value_name = "TIER", conflicts_with = "schedule")]
         tier: Option<TierChoice>,
+        /// Let the run react in time, as far as the system permits it: lock its memory, and run it before
+        /// other programs, with a priority from 1 to 99, by default 50
+        #[arg(long, value_name = "PRIORITY", num_args = 0..=1, require_equals = true, default_missing_value = "50")]
+        #[arg(value_parser = clap::value_parser!(u8).range(1..=99), conflicts_with_all = ["schedule", "state"])]
+        realtime: Option<u8>,
         /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
         /// Perfetto
         #[arg(long, value_name = "FILE")]

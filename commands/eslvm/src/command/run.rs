@@ -14,6 +14,7 @@ use esl_vm::vm::Tier;
 use super::figures::{print_functions, print_stats, print_tasks};
 use super::options::{ClockChoice, MachineOptions, Stats, TierChoice};
 use super::program::{complain_of_signal, program};
+use super::realtime::react_in_time;
 use crate::mcap::{McapRecording, RunFileOptions};
 use crate::operate::{OperateOptions, tell_manager};
 use crate::profile::{INTERVAL, Profile, ProfileUnit};
@@ -23,6 +24,7 @@ use crate::signal::{SignalTarget, end_on_signal};
 pub(crate) struct RunReports<'a> {
     pub(crate) stats: Option<Stats>,
     pub(crate) tier: Option<TierChoice>,
+    pub(crate) realtime: Option<u8>,
     pub(crate) timeline: Option<&'a Path>,
     pub(crate) record: Option<&'a Path>,
     pub(crate) files: &'a RunFileOptions,
@@ -49,6 +51,7 @@ pub(crate) fn run(
     let RunReports {
         stats,
         tier,
+        realtime,
         timeline,
         profile,
         profile_unit,
@@ -137,6 +140,9 @@ pub(crate) fn run(
         recorder.begin(&beginning);
     }
     let managed = tell_manager(&machine, &name)?;
+    if let Some(priority) = realtime {
+        react_in_time(priority, options.config().memory);
+    }
     let started = std::time::Instant::now();
     let is_profiled = profile.is_some() || stats == Some(Stats::Functions);
     let mut found = is_profiled.then(|| Profile::begin(&mut machine));

@@ -34,6 +34,7 @@ mod chapters {
         possible_failures = "possible-failures.md",
         property_locks = "property-locks.md",
         python = "python.md",
+        realtime = "realtime.md",
         reference = "reference.md",
         repl = "repl.md",
         replay = "replay.md",
