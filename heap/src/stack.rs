@@ -38,9 +38,10 @@ list_state! { Stack { start: Visited, capacity: Run, scan: Derived } }
 // SAFETY: a stack owns its segment; the values in it belong to the heap of the machine that owns the stack.
 unsafe impl Send for Stack {}
 
-/// Words of the smallest stack. With the word that an allocator takes for itself it fills a block of 128
-/// bytes; the other sizes fill blocks likewise.
-const SMALLEST: usize = 15;
+/// Words of the smallest stack: enough for a task whose function waits at once, of which there may be
+/// millions. With the word that an allocator takes for itself it fills a block of 64 bytes; the other sizes
+/// fill blocks likewise.
+const SMALLEST: usize = 7;
 
 /// Words from which on a segment fills whole pages, with the two words that an allocator takes for itself.
 const LARGE: usize = 1 << 14;
@@ -52,7 +53,7 @@ const MOST: usize = 1 << 18;
 /// Words of two pages.
 const PAGES: usize = 1024;
 
-/// Returns the size of the smallest segment with at least `words` words: 15, 23, 31, 47, 63, 95, …
+/// Returns the size of the smallest segment with at least `words` words: 7, 11, 15, 23, 31, 47, 63, 95, …
 fn segment(words: usize) -> usize {
     assert!(words < 1 << 31, "a stack has less than 2^31 words");
     if words >= LARGE {
@@ -298,10 +299,11 @@ mod tests {
 
     #[test]
     fn segments_are_as_large_as_asked_for_and_not_much_larger() {
-        assert_eq!([1, 15, 16, 23, 24, 31, 32, 47, 48].map(segment), [15, 15, 23, 23, 31, 31, 47, 47, 63]);
+        assert_eq!([1, 7, 8, 11, 12, 15, 16, 23].map(segment), [7, 7, 11, 11, 15, 15, 23, 23]);
+        assert_eq!([24, 31, 32, 47, 48].map(segment), [31, 31, 47, 47, 63]);
         for words in (1..5000).chain(16_000..20_000) {
             let segment = segment(words);
-            assert!(segment >= words && (segment <= 15 || segment * 2 <= words * 3), "{words} {segment}");
+            assert!(segment >= words && (segment <= 7 || segment * 2 <= words * 3), "{words} {segment}");
         }
     }
 }

@@ -250,27 +250,28 @@ pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     vm.scheduler.wait_for_deliveries()?;
     let task = vm.scheduler.task().object;
-    let list = vm.heap.cons(arguments[0], vm.heap.slot_or_nil(task, event::CHECKPOINTS))?;
+    event::reserve_checkpoints(&mut vm.heap, task)?;
+    let list = vm.heap.cons(arguments[0], event::checkpoints(&vm.heap, task))?;
     vm.signal_event(task, arguments)?;
-    vm.heap.slot_set(task, event::CHECKPOINTS, list);
+    event::set_checkpoints(&mut vm.heap, task, list);
     Ok(Value::NIL)
 }
 
 pub(super) fn checkpoints(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
     let task = expect_task(vm, arguments[0])?;
-    Ok(vm.heap.slot_or_nil(task, event::CHECKPOINTS))
+    Ok(event::checkpoints(&vm.heap, task))
 }
 
 pub(super) fn held(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    Ok(vm.heap.slot_or_nil(vm.scheduler.task().object, event::HELD))
+    Ok(event::held(&vm.heap, vm.scheduler.task().object))
 }
 
 pub(super) fn set_held(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !arguments[0].is_list() {
         return vm.exchange.type_error(arguments[0], "LIST");
     }
-    vm.heap.slot_set(vm.scheduler.task().object, event::HELD, arguments[0]);
+    event::set_held(&mut vm.heap, vm.scheduler.task().object, arguments[0]);
     Ok(arguments[0])
 }
 

@@ -17,12 +17,12 @@ use crate::wait::event;
 /// [`Leave::Ended`] when there is nothing left to do.
 pub(super) fn end_task(vm: &mut Vm) -> Result<(), Leave> {
     resume_end(vm);
-    let held = vm.heap.slot_or_nil(vm.scheduler.task().object, event::HELD);
+    let held = event::held(&vm.heap, vm.scheduler.task().object);
     if held.is_nil() {
         return Err(Leave::Ended);
     }
     put_off_end(vm);
-    vm.heap.slot_set(vm.scheduler.task().object, event::HELD, Value::NIL);
+    event::set_held(&mut vm.heap, vm.scheduler.task().object, Value::NIL);
     start::begin_again(vm, vm.names.known.release_held, held);
     Ok(())
 }

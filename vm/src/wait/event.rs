@@ -25,12 +25,18 @@ pub(crate) const STATE: usize = 4;
 /// Slot of a task: its node in the tree, or that of its maker, while it lives: see [`super::lineage`]. Then
 /// its value or values, or the condition, or a cons of that and the history of the failure.
 pub(crate) const RESULT: usize = 5;
-/// Slot of a task: checkpoints that it has passed.
-pub(crate) const CHECKPOINTS: usize = 6;
-/// Slot of a task: list of what the library lets go of at its end.
-pub(crate) const HELD: usize = 7;
+/// Slot of a task: list of the things that the library releases at its end; once it has passed a checkpoint,
+/// a record of that list and of its checkpoints. Few tasks have either, and there may be millions of tasks.
+const PARTS: usize = 6;
 /// Number of slots of a task.
-pub(crate) const TASK_LENGTH: usize = 8;
+pub(crate) const TASK_LENGTH: usize = 7;
+
+/// Slot of the record of parts: the list of things to release.
+const HELD: usize = 0;
+/// Slot of the record of parts: the checkpoints.
+const CHECKPOINTS: usize = 1;
+/// Tells the record of parts from others.
+const PARTS_AUX: u16 = 3;
 
 /// Number of slots that every event has.
 const LENGTH: usize = 4;
@@ -113,6 +119,51 @@ pub(crate) fn is_awaited(heap: &Heap, event: Value) -> bool {
 /// Returns the condition and the history of a failure, from the result of a task that has failed.
 pub(crate) fn failure(heap: &Heap, result: Value) -> (Value, Value) {
     heap.as_cons(result).map_or((result, Value::NIL), |pair| (pair.car, pair.cdr))
+}
+
+/// Returns the record of a task's parts, if it has one.
+fn parts(heap: &Heap, task: Value) -> Option<Value> {
+    let parts = heap.slot_or_nil(task, PARTS);
+    heap.is(parts, Kind::Record).then_some(parts)
+}
+
+/// Returns the list of the things that the library releases at the end of a task.
+pub(crate) fn held(heap: &Heap, task: Value) -> Value {
+    parts(heap, task).map_or_else(|| heap.slot_or_nil(task, PARTS), |parts| heap.slot_or_nil(parts, HELD))
+}
+
+/// Sets that list. Takes no memory.
+pub(crate) fn set_held(heap: &mut Heap, task: Value, list: Value) {
+    debug_assert!(list.is_list());
+    match parts(heap, task) {
+        Some(parts) => heap.slot_set(parts, HELD, list),
+        None => heap.slot_set(task, PARTS, list),
+    };
+}
+
+/// Returns the checkpoints that a task has passed, the last one first.
+pub(crate) fn checkpoints(heap: &Heap, task: Value) -> Value {
+    parts(heap, task).map_or(Value::NIL, |parts| heap.slot_or_nil(parts, CHECKPOINTS))
+}
+
+/// Makes room for the checkpoints of a task, so that [`set_checkpoints`] takes no memory.
+///
+/// # Errors
+/// As for every allocation; then nothing has happened.
+pub(crate) fn reserve_checkpoints(heap: &mut Heap, task: Value) -> Result<(), AllocError> {
+    if parts(heap, task).is_none() {
+        let held = heap.slot_or_nil(task, PARTS);
+        let parts = heap.alloc_record(Kind::Record, 0, PARTS_AUX, &[held, Value::NIL])?;
+        heap.slot_set(task, PARTS, parts);
+    }
+    Ok(())
+}
+
+/// Sets the checkpoints of a task that has room for them.
+pub(crate) fn set_checkpoints(heap: &mut Heap, task: Value, list: Value) {
+    if let Some(parts) = parts(heap, task) {
+        heap.slot_set(parts, CHECKPOINTS, list);
+    }
 }
 
 /// Returns the place of the task that `object` stands for, while it lives.
