@@ -99,6 +99,11 @@ const FAULTS: [i32; 5] = {
     [SIGILL, SIGTRAP, SIGBUS, SIGFPE, SIGSEGV]
 };
 
+/// The first of the signals without a meaning of their own, which are handled soon after the others: to add
+/// them to those takes as long as a small program.
+#[cfg(unix)]
+const FIRST_REAL_TIME: i32 = 32;
+
 /// Returns the signal of a number of the system's, if it is to be passed on to the machine.
 #[cfg(unix)]
 fn signal_of(number: i32) -> Option<ProcessSignal> {
@@ -130,16 +135,17 @@ fn on_signal(with_window: bool, handler: impl Fn(ProcessSignal) + Send + 'static
     // A signal without a handler would end the process. Children have the system's own handling again, as
     // they would not if this one were ignored.
     _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
-    let is_wanted = |&number: &i32| {
+    let is_wanted = move |&number: &i32| {
         signal_of(number).is_some_and(|signal| with_window || signal != ProcessSignal::Window)
     };
     // Without a handler a signal ends the process at once, which is the next best thing.
     let Ok(mut coming) = signal_hook::iterator::Signals::new(std::iter::empty::<i32>()) else { return };
-    for number in (1..=64).filter(is_wanted) {
-        // The system may not have it.
-        _ = coming.add_signal(number);
-    }
-    let pass_on = move || coming.forever().filter_map(signal_of).for_each(handler);
+    // The system may not have one.
+    (1..FIRST_REAL_TIME).filter(is_wanted).for_each(|number| _ = coming.add_signal(number));
+    let pass_on = move || {
+        (FIRST_REAL_TIME..=64).filter(is_wanted).for_each(|number| _ = coming.add_signal(number));
+        coming.forever().filter_map(signal_of).for_each(handler);
+    };
     drop(std::thread::Builder::new().name("signals".into()).spawn(pass_on));
 }
 
