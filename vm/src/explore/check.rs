@@ -50,7 +50,7 @@ pub(super) fn check_state(vm: &mut Vm, checks: Value) -> bool {
 }
 
 impl Vm {
-    /// Returns the name of the condition of `eventually` or `leads-to` with this number, as the program stands.
+    /// Returns the name of the condition of `eventually` or `leads-to` with this number.
     pub fn name_of_condition(&mut self, number: u32) -> Option<String> {
         let variable = self.names.intern_esl(&mut self.heap, "*%CONDITIONS*").ok()?;
         let mut rest = self.heap.symbol(variable)?.value;
