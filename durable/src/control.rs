@@ -19,6 +19,8 @@ pub struct Resumed {
     pub interrupted: usize,
     /// Number of connections and servers that signalled inputs and are gone.
     pub lost: usize,
+    /// Number of calls that are made again to open them, as far as that is possible.
+    pub again: usize,
 }
 
 /// Is called when a run is upgraded.

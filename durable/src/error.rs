@@ -3,6 +3,7 @@
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use esl_bytecode::file::WriteError;
 use esl_replay::RecordedError;
@@ -21,6 +22,10 @@ pub enum DurableError {
     NotPrivate(PathBuf),
     /// There is no durable run in the folder.
     NoRun(PathBuf),
+    /// The folder has a durable run already.
+    HasRun(PathBuf),
+    /// The run cannot be copied as it was so long ago: its folder has only this much of its past.
+    TooFarBack(Duration),
     /// The journal was changed, or another machine has written it.
     Journal(RecordedError),
     /// The run has not begun.
@@ -66,6 +71,14 @@ impl fmt::Display for DurableError {
             DurableError::NoRun(path) => {
                 write!(f, "there is no durable run in {}; `eslvm run --state` begins one", path.display())
             }
+            DurableError::HasRun(path) => {
+                write!(f, "{} has a durable run already; name a folder without one", path.display())
+            }
+            DurableError::TooFarBack(kept) => write!(
+                f,
+                "the folder has only the last {:.1} s of the run, from its oldest snapshot on",
+                kept.as_secs_f64()
+            ),
             DurableError::Journal(RecordedError::OtherMachine) => f.write_str(
                 "the run was begun by another version of the machine or its library; go on with that version, or \
                  begin a new run in another folder",

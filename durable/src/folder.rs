@@ -2,6 +2,8 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::path::{Path, PathBuf};
+#[cfg(unix)]
+use std::time::Duration;
 
 use super::DurableError;
 
@@ -10,7 +12,10 @@ const LOCK: &str = "lock";
 
 /// Time in which a process that was killed lets go of the lock, its fork included.
 #[cfg(unix)]
-const PATIENCE: std::time::Duration = std::time::Duration::from_secs(2);
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Time for which a lock is waited for whose holder seems to run. It may have been killed just now.
+#[cfg(unix)]
+const DOUBT: Duration = Duration::from_millis(300);
 
 /// The folder of a durable run, or of several, which this process has until this is dropped.
 #[derive(Debug)]
@@ -72,8 +77,10 @@ fn take_lock(lock: &File, path: &Path) -> Result<(), DurableError> {
     loop {
         match flock(lock, FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => break,
-            Err(Errno::WOULDBLOCK) if begun.elapsed() < PATIENCE && !is_holder_alive(lock) => {
-                std::thread::sleep(std::time::Duration::from_millis(5));
+            Err(Errno::WOULDBLOCK)
+                if begun.elapsed() < DOUBT || begun.elapsed() < PATIENCE && !is_holder_alive(lock) =>
+            {
+                std::thread::sleep(Duration::from_millis(5));
             }
             Err(Errno::WOULDBLOCK) => return Err(DurableError::InUse(path.into())),
             Err(error) => return Err(folder_error(error.into())),

@@ -2,14 +2,13 @@
 
 use std::collections::HashSet;
 
-use esl_bytecode::datum::Datum;
+use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_host::{
-    ActionId, CallEffect, HostCall, HostError, HostFailure, Incoming, News, NotedRecord, Record,
-    has_gone_object,
+    ActionId, HostCall, HostError, HostFailure, Incoming, News, NotedRecord, Record, has_gone_object,
 };
-use esl_replay::OpenCall;
+use esl_replay::{JournalLife, OpenCall};
 
 /// Returns the failure of a call that the end of its process has interrupted.
 pub(crate) fn interrupted(call: HostCall<'_>, action: Option<ActionId>) -> HostFailure {
@@ -30,6 +29,16 @@ pub(crate) fn refused() -> HostError {
 /// Returns the failure of such a call.
 pub(crate) fn refused_call() -> HostFailure {
     HostFailure { cause: "JOURNAL-NOT-WRITTEN".into(), arguments: Vec::new() }
+}
+
+/// Returns the message by which the program is told that it goes on in another process.
+pub(crate) fn resumed_message(life: &JournalLife, downtime: f64) -> Incoming {
+    let number = i64::try_from(life.number).unwrap_or(i64::MAX);
+    let arguments = vec![
+        Datum::new(DatumKind::Float(downtime), Span::default()),
+        Datum::integer(number, Span::default()),
+    ];
+    Incoming::Message { input: "*RESUMED*".into(), arguments }
 }
 
 /// Returns the numbers of the operations that have ended by these records.
@@ -74,10 +83,10 @@ pub(crate) fn senders(records: &[NotedRecord], before: usize) -> usize {
 
 /// Returns the news of a call that was interrupted, or that has an object of an earlier process.
 pub(crate) fn after_restart(call: HostCall<'_>, action: Option<ActionId>) -> News {
-    match call.effect {
-        CallEffect::Closes => News::Completed(vec![Datum::nil(Span::default())]),
-        _ => News::Failed(interrupted(call, action)),
+    if call.effect.is_done_by_restart() {
+        return News::Completed(vec![Datum::nil(Span::default())]);
     }
+    News::Failed(interrupted(call, action))
 }
 
 /// Returns a call that is under way.

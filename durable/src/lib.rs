@@ -43,10 +43,12 @@ mod engine;
 mod error;
 mod file_effect;
 mod folder;
+mod fork;
 mod generations;
 mod host;
 mod interruption;
 mod kill_place;
+mod lasting;
 mod log;
 mod look;
 mod rest;
@@ -73,6 +75,7 @@ pub use disk::{Disk, RealDisk, SnapshotWriting};
 pub use engine::{DurableEnding, DurableEngine, DurableSettings};
 pub use error::DurableError;
 pub use folder::RunFolder;
+pub use fork::{RunFork, fork};
 pub use host::DurableHost;
 pub use log::LogFigures;
 pub use look::{DurableState, look};
@@ -81,6 +84,7 @@ pub use snapshots::{SnapshotEvery, SnapshotFigures};
 pub use upgrade::UpgradeReport;
 
 use generations::FoundJournals;
+use lasting::LastingCalls;
 use log::{JournalLog, Standing};
 use resume::{Resumption, chance, wall_clock};
 use snapshots::SnapshotTaker;
@@ -126,6 +130,7 @@ pub struct DurableRun {
     log: JournalLog,
     control: DurableControl,
     taker: SnapshotTaker,
+    lasting: LastingCalls,
     /// Start of the addresses of the machine's heap; `None` if it is never copied.
     range: Option<usize>,
     /// Warnings about the files.
@@ -201,15 +206,24 @@ impl DurableRun {
         found: Option<FoundJournals>,
         options: DurableOptions,
     ) -> Result<DurableRun, DurableError> {
-        let control = DurableControl::default();
+        let (control, lasting) = (DurableControl::default(), LastingCalls::default());
         let fresh = (options.snapshots != SnapshotEvery::Never).then(|| range_start(chance())).flatten();
         let Some(FoundJournals { journal, base, last: number, oldest, snapshot_bytes: _, warnings }) = found
         else {
             let standing = Standing::default();
             let log = JournalLog::new(disk, JournalWriter::default(), 0, options.durability, standing);
-            let taker = SnapshotTaker::new(options.snapshots, log.clone(), control.clone());
+            let taker = SnapshotTaker::new(options.snapshots, log.clone(), control.clone(), lasting.clone());
             let (folder, warnings) = (None, Vec::new());
-            return Ok(DurableRun { folder, log, control, taker, range: fresh, warnings, found: None });
+            return Ok(DurableRun {
+                folder,
+                log,
+                control,
+                taker,
+                lasting,
+                range: fresh,
+                warnings,
+                found: None,
+            });
         };
         let RunJournal { recorded, lives, upgrades, length, time, generation: _, writer } = journal;
         if !recorded.beginning.is_of_this_machine() {
@@ -220,11 +234,11 @@ impl DurableRun {
         let resumption = Resumption::new(&last, time, wall_clock(), options.downtime, options.hosted);
         let standing = Standing { number, base, oldest, ..Standing::after(&recorded, &upgrades) };
         let log = JournalLog::new(disk, writer, length as u64, options.durability, standing);
-        let taker = SnapshotTaker::new(options.snapshots, log.clone(), control.clone());
+        let taker = SnapshotTaker::new(options.snapshots, log.clone(), control.clone(), lasting.clone());
         let snapshot = recorded.start.as_ref().and_then(|start| start.snapshot.as_ref());
         let range = snapshot.map(|snapshot| snapshot.range).or(fresh);
         let found = FoundRun { recorded, upgrades, resumption, torn, upgrade: None };
-        Ok(DurableRun { folder: None, log, control, taker, range, warnings, found: Some(found) })
+        Ok(DurableRun { folder: None, log, control, taker, lasting, range, warnings, found: Some(found) })
     }
 
     /// Returns warnings about the files, such as that of a damaged snapshot.
@@ -262,6 +276,7 @@ impl DurableRun {
                 machine.begin_again(call.number, &call.name, &call.arguments, call.action);
             }
         }
+        self.lasting.restore(&generation.lasting, machine);
         self.control.start_past(generation.not_due, generation.time());
         Ok(Some(main))
     }
@@ -317,7 +332,8 @@ impl DurableRun {
             Some(found) => (found.recorded.records.clone(), Some(found.resumption), found.upgrade.clone()),
             None => (Vec::new().into(), None, None),
         };
-        DurableHost::new(host, self.log.clone(), self.control.clone(), records, start, resumption, upgrade)
+        let (log, control, lasting) = (self.log.clone(), self.control.clone(), self.lasting.clone());
+        DurableHost::new(host, log, (control, lasting), records, start, resumption, upgrade)
     }
 
     /// Writes the program and the settings of a new run, or compares them with those with which the run has
@@ -387,6 +403,7 @@ impl DurableRun {
             return Err(DurableError::Diverged("the run has ended, and the journal has more of it".into()));
         }
         self.log.end(machine.check(), status);
+        self.taker.finish();
         self.check()?;
         self.note_rest(RunRest::Ended(status));
         Ok(())

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use esl_host::{ActionId, Inbox, Incoming, News, NotedRecord, Record, Recorder, RunCheck};
 use esl_replay::{
     Beginning, JournalGeneration, JournalLife, JournalUpgrade, JournalWriter, OpenCall, Recorded,
-    RecordedEnd, journal_beginning, journal_end, journal_life,
+    RecordedEnd, StoredCall, journal_beginning, journal_end, journal_life,
 };
 use esl_vm::heap::HeapMemory;
 
@@ -197,12 +197,18 @@ impl JournalLog {
         writing.standing.records > writing.begun_at
     }
 
-    /// Begins the journal of the next generation at this place. The calls with these numbers are under way.
+    /// Begins the journal of the next generation at this place. The calls with these numbers are under way,
+    /// and these calls last.
     /// Returns its number. After an error the run goes on in the same journal.
     ///
     /// # Errors
     /// If it cannot be made.
-    pub(crate) fn begin_generation(&self, open: &[u64], not_due: u64) -> io::Result<u64> {
+    pub(crate) fn begin_generation(
+        &self,
+        open: &[u64],
+        lasting: Vec<StoredCall>,
+        not_due: u64,
+    ) -> io::Result<u64> {
         let mut writing = self.lock();
         writing.write();
         writing.sync();
@@ -222,6 +228,7 @@ impl JournalLog {
         generation.not_due = not_due;
         generation.arguments.clone_from(&standing.arguments);
         generation.open = standing.open.values().cloned().collect();
+        generation.lasting = lasting;
         let (number, records) = (generation.number, generation.records);
         let contents = writer.begin_generation(beginning, generation);
         if let Err(error) = writing.disk.begin_generation(number, &contents) {

@@ -9,12 +9,13 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use esl_replay::snapshot_head;
+use esl_replay::{StoredCall, snapshot_head};
 use esl_vm::stored::StateParts;
 use esl_vm::vm::Vm;
 
 use super::control::DurableControl;
 use super::disk::SnapshotWriting;
+use super::lasting::LastingCalls;
 use super::log::JournalLog;
 
 /// When snapshots are taken.
@@ -61,6 +62,7 @@ struct Taking {
     every: SnapshotEvery,
     log: JournalLog,
     control: DurableControl,
+    lasting: LastingCalls,
     /// When the last snapshot was taken, or the run began here, and the ticks then.
     last: (Instant, u64),
     /// Time before which none is tried.
@@ -73,11 +75,17 @@ struct Taking {
 }
 
 impl SnapshotTaker {
-    pub(crate) fn new(every: SnapshotEvery, log: JournalLog, control: DurableControl) -> SnapshotTaker {
+    pub(crate) fn new(
+        every: SnapshotEvery,
+        log: JournalLog,
+        control: DurableControl,
+        lasting: LastingCalls,
+    ) -> SnapshotTaker {
         SnapshotTaker(Arc::new(Mutex::new(Taking {
             every,
             log,
             control,
+            lasting,
             last: (Instant::now(), 0),
             not_before: None,
             rounds: 0,
@@ -178,7 +186,8 @@ impl Taking {
             return false;
         }
         let open = machine.open_operations();
-        let taken = machine.with_state(|state| self.begin(range, &open, state));
+        let lasting = self.lasting.stored(machine);
+        let taken = machine.with_state(|state| self.begin(range, &open, lasting, state));
         let Some(()) = taken else {
             self.not_before = Some(Instant::now() + SOON);
             return false;
@@ -190,8 +199,8 @@ impl Taking {
     }
 
     /// Begins the next generation of the journal, and to write its snapshot.
-    fn begin(&mut self, range: usize, open: &[u64], state: &StateParts<'_>) {
-        match self.log.begin_generation(open, self.control.not_due()) {
+    fn begin(&mut self, range: usize, open: &[u64], lasting: Vec<StoredCall>, state: &StateParts<'_>) {
+        match self.log.begin_generation(open, lasting, self.control.not_due()) {
             Ok(number) => {
                 let head = snapshot_head(number, range, state);
                 match self.log.write_snapshot(number, head, state.memory()) {

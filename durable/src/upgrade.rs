@@ -24,6 +24,7 @@ use esl_vm::vm::Vm;
 use super::changes::{ProgramChanges, changes};
 use super::control::DurableControl;
 use super::disk::NowhereDisk;
+use super::lasting::LastingCalls;
 use super::log::{JournalLog, Standing};
 use super::resume::Resumption;
 use super::snapshots::{SnapshotEvery, SnapshotTaker};
@@ -63,20 +64,14 @@ pub(crate) struct Upgrade {
 }
 
 impl Upgrade {
-    /// Asks the machine with this inbox for the upgrade. `last` is the greatest number of an earlier
-    /// question. Returns the call, and the arrivals by which the machine is asked.
-    pub(crate) fn ask(&self, inbox: &Inbox, last: u64) -> (Pending, Vec<Incoming>) {
+    /// Asks the machine with this inbox for the upgrade. Returns the call, and the arrivals by which the
+    /// machine is asked.
+    pub(crate) fn ask(&self, inbox: &Inbox) -> (Pending, Vec<Incoming>) {
         let come = inbox.take();
         let sender = Sender::new(inbox);
-        let mut asked = inbox.take();
-        let mut call = sender.ask(self.question());
-        // The replay may have answered the earlier ones.
-        while call.number() <= last {
-            drop(inbox.take());
-            call = sender.ask(self.question());
-        }
+        let call = sender.ask(self.question());
         drop(sender);
-        asked.append(&mut inbox.take());
+        let asked = inbox.take();
         come.into_iter().for_each(|one| inbox.put(one));
         (call, asked)
     }
@@ -259,10 +254,19 @@ impl DurableRun {
         let snapshot = recorded.start.as_ref().and_then(|start| start.snapshot.as_ref());
         let range = snapshot.map(|snapshot| snapshot.range);
         let found = FoundRun { recorded, upgrades: Vec::new(), resumption, torn: None, upgrade };
-        let control = DurableControl::default();
+        let (control, lasting) = (DurableControl::default(), LastingCalls::default());
         control.set_copy();
-        let taker = SnapshotTaker::new(SnapshotEvery::Never, log.clone(), control.clone());
-        DurableRun { folder: None, log, control, taker, range, warnings: Vec::new(), found: Some(found) }
+        let taker = SnapshotTaker::new(SnapshotEvery::Never, log.clone(), control.clone(), lasting.clone());
+        DurableRun {
+            folder: None,
+            log,
+            control,
+            taker,
+            lasting,
+            range,
+            warnings: Vec::new(),
+            found: Some(found),
+        }
     }
 
     /// Runs a copy to the end of its journal. Returns its machine there.

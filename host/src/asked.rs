@@ -5,7 +5,7 @@ use esl_bytecode::datum::{Datum, DatumKind};
 
 use super::{
     ActionId, Awaited, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, HostState, Inbox,
-    Incoming, Input, Output, Permit, ReplayState, Right, Rights, RunCheck, Wake, WriteMode,
+    Incoming, Input, Output, Permit, RepeatedCall, ReplayState, Right, Rights, RunCheck, Wake, WriteMode,
 };
 use crate::canary::Canary;
 
@@ -306,6 +306,18 @@ impl Host for Asked {
     fn check(&mut self, check: RunCheck) {
         // No question of the run's.
         self.host.check(check);
+    }
+
+    fn next_repeated(&mut self) -> Option<RepeatedCall> {
+        self.host.next_repeated()
+    }
+
+    fn permits_repeated(&mut self, right: Right, object: &str) -> bool {
+        self.host.permits_repeated(right, object)
+    }
+
+    fn answer_repeated(&mut self, answer: Result<Datum, HostFailure>) {
+        self.host.answer_repeated(answer);
     }
 }
 

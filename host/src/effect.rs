@@ -10,19 +10,29 @@ use esl_bytecode::datum::{Datum, DatumKind};
 pub enum CallEffect {
     /// It reaches nothing outside of the process.
     Local,
-    /// It closes one of its arguments, which ends with the process anyway.
+    /// It closes its objects, which end with the process anyway.
     Closes,
+    /// It lets go of a part of its objects, which ends with the process anyway.
+    Releases,
     /// It may be made twice: it only reads, or the second time changes nothing.
     Idempotent,
     /// It may not be made twice.
     #[default]
     Once,
+    /// Its effect lasts until one of its objects is closed, as that of a server or a subscription does: the next
+    /// process of a durable run makes it again.
+    Lasts,
 }
 
 impl CallEffect {
     /// Returns whether an interrupted call is made again.
     pub fn may_be_repeated(self) -> bool {
         self != CallEffect::Once
+    }
+
+    /// Returns whether nothing is left to do for a call whose objects are gone with an earlier process.
+    pub fn is_done_by_restart(self) -> bool {
+        matches!(self, CallEffect::Closes | CallEffect::Releases)
     }
 }
 
@@ -47,6 +57,17 @@ pub struct HostCall<'a> {
     pub effect: CallEffect,
     /// Number of the operation that the call begins, if it begins one.
     pub operation: Option<u64>,
+}
+
+/// A call that an earlier process has made, and that is made again in this one.
+#[derive(Clone, Debug)]
+pub struct RepeatedCall {
+    /// Number of the operation, if the function begins one: greater than those of the machine.
+    pub number: u64,
+    /// Name of the function.
+    pub name: String,
+    /// Arguments.
+    pub arguments: Vec<Datum>,
 }
 
 /// The value of an object of the host that an earlier process held, and that is gone with it.

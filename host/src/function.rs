@@ -108,6 +108,19 @@ impl HostRow {
         self
     }
 
+    /// Notes that a call lets go of a part of one of its arguments.
+    pub fn releases(&mut self) -> &mut HostRow {
+        self.effect = CallEffect::Releases;
+        self
+    }
+
+    /// Notes that the effect of a call lasts until one of its objects is closed, be it an argument or a value:
+    /// the next process of a durable run makes the call again.
+    pub fn lasts(&mut self) -> &mut HostRow {
+        self.effect = CallEffect::Lasts;
+        self
+    }
+
     /// Notes that a call closes one of its arguments.
     pub fn closes(&mut self) -> &mut HostRow {
         self.effect = CallEffect::Closes;

@@ -11,7 +11,7 @@ use std::fmt;
 
 use esl_bytecode::datum::Datum;
 
-use super::{ActionId, HostCall, HostFailure, Inbox, Incoming, Permit, Right, Rights};
+use super::{ActionId, HostCall, HostFailure, Inbox, Incoming, Permit, RepeatedCall, Right, Rights};
 
 /// A stream that bytes are written to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -306,6 +306,23 @@ pub trait Host {
     fn poll(&mut self, round: u64) -> Vec<Incoming> {
         let _ = round;
         self.inbox().take()
+    }
+
+    /// Returns a call of an earlier process that is to be made again now, after each [`Host::poll`] until none
+    /// is left. The answer goes to [`Host::answer_repeated`]; that of an operation comes by the inbox.
+    fn next_repeated(&mut self) -> Option<RepeatedCall> {
+        None
+    }
+
+    /// Returns whether this process has a right that a call which is made again needs.
+    fn permits_repeated(&mut self, right: Right, object: &str) -> bool {
+        let _ = (right, object);
+        true
+    }
+
+    /// Takes the answer of the call that was made again last.
+    fn answer_repeated(&mut self, answer: Result<Datum, HostFailure>) {
+        let _ = answer;
     }
 
     /// Returns whether this is a replay, which waits for nothing: all that can come comes by itself, in one

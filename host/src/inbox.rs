@@ -72,6 +72,8 @@ pub enum Incoming {
     SenderLeft,
     /// Operators that send messages may attach at any time.
     Attended,
+    /// No operator can attach any more, since the process is gone that let them.
+    Unattended,
     /// The run is an agent of a host, which may pass messages to it at any time.
     Hosted,
 }

@@ -60,7 +60,7 @@ mod value;
 mod virtual_host;
 
 pub use argument::{ArgumentList, ArgumentReader, CallAction, FromArgument, FromCall, Payload};
-pub use effect::{ActionId, CallEffect, GoneObject, HostCall, has_gone_object};
+pub use effect::{ActionId, CallEffect, GoneObject, HostCall, RepeatedCall, has_gone_object};
 pub use external_clock::ClockStep;
 pub use function::{
     BeginFuture, Completion, DataFunction, Handler, HostFunction, HostModule, HostRow, HostRows, Need,

@@ -200,6 +200,14 @@ impl Inbox {
         }
     }
 
+    /// Gives the questions from here on numbers above `last`: those up to it belong to earlier processes of the
+    /// run.
+    #[doc(hidden)]
+    pub fn number_questions_above(&self, last: u64) {
+        let mut open = self.asking().waiting();
+        open.asked = open.asked.max(last);
+    }
+
     /// Says that no question will be answered any more.
     #[doc(hidden)]
     pub fn end_answers(&self) {

@@ -27,6 +27,26 @@ pub struct OpenCall {
     pub action: ActionId,
 }
 
+/// An argument of a call that lasts.
+#[derive(Clone, Debug)]
+pub enum StoredArgument {
+    /// Data.
+    Data(Datum),
+    /// An object of the host, by its number in the machine.
+    Object(u64),
+}
+
+/// A call that lasts, which each process makes again.
+#[derive(Clone, Debug)]
+pub struct StoredCall {
+    /// Name of the function.
+    pub name: String,
+    /// Arguments.
+    pub arguments: Vec<StoredArgument>,
+    /// The objects among its values, by their numbers in the machine.
+    pub values: Vec<Option<u64>>,
+}
+
 /// The place at which a journal begins.
 #[derive(Clone, Debug, Default)]
 pub struct JournalGeneration {
@@ -50,6 +70,8 @@ pub struct JournalGeneration {
     pub arguments: Option<Vec<String>>,
     /// The calls under way, by number.
     pub open: Vec<OpenCall>,
+    /// The calls that last, in the order in which they were made.
+    pub lasting: Vec<StoredCall>,
     pub(super) before: Before,
 }
 
@@ -72,6 +94,7 @@ impl JournalGeneration {
             not_due,
             arguments,
             open,
+            lasting,
             before,
         } = self;
         let mut out = ByteWriter::default();
@@ -86,6 +109,21 @@ impl JournalGeneration {
             out.list(&call.arguments, |out, argument| out.datum(argument));
             out.byte(call.effect as u8);
             out.0.extend_from_slice(&call.action.0.to_le_bytes());
+        });
+        out.list(lasting, |out, call| {
+            out.text(&call.name);
+            out.list(&call.arguments, |out, argument| match argument {
+                StoredArgument::Data(datum) => {
+                    out.byte(0);
+                    out.datum(datum);
+                }
+                StoredArgument::Object(number) => {
+                    out.byte(1);
+                    out.number(*number);
+                }
+            });
+            // Numbers of objects begin at 1.
+            out.list(&call.values, |out, number| out.number(number.unwrap_or(0)));
         });
         before.write(&mut out);
         let mut bytes = Vec::new();
@@ -111,6 +149,16 @@ impl JournalGeneration {
                 action: ActionId(u128::from_le_bytes(from.array()?)),
             })
         })?;
+        let lasting = from.list(|from| {
+            let name = from.text()?.into();
+            let arguments = from.list(|from| match from.byte()? {
+                0 => from.datum().map(StoredArgument::Data),
+                1 => from.number().map(StoredArgument::Object),
+                _ => None,
+            })?;
+            let values = from.list(|from| from.number().map(|number| (number > 0).then_some(number)))?;
+            Some(StoredCall { name, arguments, values })
+        })?;
         let before = Before::read(from)?;
         let is_whole = from.is_empty() && number > 0 && arguments.len() < 2;
         is_whole.then(|| JournalGeneration {
@@ -124,13 +172,15 @@ impl JournalGeneration {
             not_due,
             arguments: arguments.pop(),
             open,
+            lasting,
             before,
         })
     }
 }
 
 fn effect(byte: u8) -> Option<CallEffect> {
-    let all = [CallEffect::Local, CallEffect::Closes, CallEffect::Idempotent, CallEffect::Once];
+    use CallEffect::{Closes, Idempotent, Lasts, Local, Once, Releases};
+    let all = [Local, Closes, Releases, Idempotent, Once, Lasts];
     all.into_iter().find(|&effect| effect as u8 == byte)
 }
 

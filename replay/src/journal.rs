@@ -294,51 +294,70 @@ impl RunJournal {
     /// # Errors
     /// [`RecordedError`].
     pub fn read(bytes: &[u8]) -> Result<RunJournal, RecordedError> {
-        let Some(rest) = bytes.strip_prefix(&MAGIC) else {
-            let is_torn = MAGIC.starts_with(bytes) || bytes.iter().all(|&byte| byte == 0);
-            return Err(if is_torn { RecordedError::NoBeginning } else { RecordedError::NotOne });
-        };
-        let (version, _) = rest.split_first_chunk::<4>().ok_or(RecordedError::NoBeginning)?;
-        let version = u32::from_le_bytes(*version);
-        if version != FORMAT {
-            return Err(RecordedError::Format(version));
-        }
-        let mut reading = JournalReading::default();
-        let mut offset = MAGIC.len() + 4;
-        while offset < bytes.len() {
-            match find(bytes, offset) {
-                FoundFrame::Frame(kind, content) => {
-                    reading.take(offset, kind, content)?;
-                    offset += FRAME + content.len();
-                }
-                FoundFrame::Torn if reading.lives.is_empty() => break,
-                FoundFrame::Wrong(problem) if reading.lives.is_empty() => {
-                    return Err(RecordedError::Damaged { offset, problem });
-                }
-                _ if is_torn(bytes, offset) => break,
-                FoundFrame::Torn => {
-                    let problem = "a part of it is missing, though later parts are there, as after a loss of power \
-                                   without `--durability power`";
-                    return Err(RecordedError::Damaged { offset, problem });
-                }
-                FoundFrame::Wrong(problem) => return Err(RecordedError::Damaged { offset, problem }),
-            }
-        }
+        let (reading, length) = read_frames(bytes, u64::MAX)?;
         let JournalReading { beginning, records, lives, upgrades, end, before, generation, .. } = reading;
         let number = generation.as_ref().map_or(0, |generation| generation.number);
         let start = generation.map(|generation| Arc::new(RunStart { generation, snapshot: None }));
         let beginning = beginning.ok_or(RecordedError::NoBeginning)?;
-        let torn = bytes.len() - offset;
+        let torn = bytes.len() - length;
         Ok(RunJournal {
             recorded: Recorded { beginning, records: records.into(), end, torn, start },
             lives,
             upgrades,
-            length: offset,
+            length,
             time: before.time(),
             generation: number,
             writer: JournalWriter { packed: ByteWriter::default(), before },
         })
     }
+
+    /// Returns the length of the part of a file that was there when the program's clock showed `time`, as far
+    /// as its frames tell.
+    ///
+    /// # Errors
+    /// [`RecordedError`].
+    pub fn length_until(bytes: &[u8], time: u64) -> Result<usize, RecordedError> {
+        read_frames(bytes, time).map(|(_, length)| length)
+    }
+}
+
+/// Reads the frames of a file up to the first one that goes beyond `time`. Returns their contents, with those
+/// of that frame, and their length without it.
+fn read_frames(bytes: &[u8], time: u64) -> Result<(JournalReading, usize), RecordedError> {
+    let Some(rest) = bytes.strip_prefix(&MAGIC) else {
+        let is_torn = MAGIC.starts_with(bytes) || bytes.iter().all(|&byte| byte == 0);
+        return Err(if is_torn { RecordedError::NoBeginning } else { RecordedError::NotOne });
+    };
+    let (version, _) = rest.split_first_chunk::<4>().ok_or(RecordedError::NoBeginning)?;
+    let version = u32::from_le_bytes(*version);
+    if version != FORMAT {
+        return Err(RecordedError::Format(version));
+    }
+    let mut reading = JournalReading::default();
+    let mut offset = MAGIC.len() + 4;
+    while offset < bytes.len() {
+        match find(bytes, offset) {
+            FoundFrame::Frame(kind, content) => {
+                reading.take(offset, kind, content)?;
+                if reading.time() > time {
+                    break;
+                }
+                offset += FRAME + content.len();
+            }
+            FoundFrame::Torn if reading.lives.is_empty() => break,
+            FoundFrame::Wrong(problem) if reading.lives.is_empty() => {
+                return Err(RecordedError::Damaged { offset, problem });
+            }
+            _ if is_torn(bytes, offset) => break,
+            FoundFrame::Torn => {
+                let problem = "a part of it is missing, though later parts are there, as after a loss of power \
+                                   without `--durability power`";
+                return Err(RecordedError::Damaged { offset, problem });
+            }
+            FoundFrame::Wrong(problem) => return Err(RecordedError::Damaged { offset, problem }),
+        }
+    }
+    Ok((reading, offset))
 }
 
 impl RunJournal {
@@ -392,6 +411,11 @@ impl Default for JournalReading {
 }
 
 impl JournalReading {
+    /// Returns the time of the program's clock at the last record or process.
+    fn time(&self) -> u64 {
+        self.before.time().max(self.lives.last().map_or(0, |life| life.time))
+    }
+
     /// Takes the frame at `offset`.
     fn take(&mut self, offset: usize, kind: u8, content: &[u8]) -> Result<(), RecordedError> {
         let damaged = |problem| RecordedError::Damaged { offset, problem };

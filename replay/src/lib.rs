@@ -55,7 +55,7 @@ use esl::program::{self, ExecutionIdentity, Program, Summary};
 pub use breakpoint::{Breakpoint, StopError, Target};
 pub use debugger::Debugger;
 pub use file::{Beginning, FORMAT, GivenFunction, MAGIC, Recorded, RecordedEnd, RecordedError, RunStart};
-pub use generation::{JournalGeneration, OpenCall};
+pub use generation::{JournalGeneration, OpenCall, StoredArgument, StoredCall};
 pub use journal::{
     JournalLife, JournalUpgrade, JournalWriter, RunJournal, journal_beginning, journal_end, journal_life,
 };

@@ -208,7 +208,8 @@ packed_by_tag! {
         16 () => { Incoming::SenderLeft }
         17 () => { Incoming::Attended }
         18 () => { Incoming::Hosted }
-        19 () => { Incoming::Interlude };
+        19 () => { Incoming::Interlude }
+        20 () => { Incoming::Unattended };
 }
 
 /// Tags of records that are differences from those before. Tags from 65 to 67 are kept for the choices and

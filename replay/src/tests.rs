@@ -147,6 +147,7 @@ pub(crate) fn records() -> Vec<NotedRecord> {
         Incoming::SenderCame,
         Incoming::SenderLeft,
         Incoming::Attended,
+        Incoming::Unattended,
         Incoming::Hosted,
         Incoming::Interlude,
     ];

@@ -19,6 +19,7 @@
 
 mod compile;
 mod identity;
+mod operators;
 mod run;
 mod schedule;
 
@@ -36,9 +37,10 @@ pub use compile::{
 };
 pub use esl_vm::explore::Settings;
 pub use identity::{EXECUTION_EPOCH, ExecutionIdentity};
+pub use operators::{TELL_OPERATOR, WRITE_OPERATOR, has_operators, load_operators};
 pub use run::{
-    Ended, Summary, begin, begin_with, end, end_rest, finish, has_operators, load, load_operators, machine,
-    run, run_by, run_in, run_in_portions, set_module_folders, set_module_path, set_program_file, set_traces,
+    Ended, Summary, begin, begin_with, end, end_rest, finish, load, machine, run, run_by, run_in,
+    run_in_portions, set_module_folders, set_module_path, set_program_file, set_traces,
 };
 pub use schedule::{Schedule, ScheduleError};
 

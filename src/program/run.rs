@@ -112,20 +112,6 @@ pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, Error> 
     Ok(machine)
 }
 
-/// Loads the functions of the library that serve operators into a machine, unless it has them. Before the
-/// program begins, since a replay loads them there.
-///
-/// # Errors
-/// [`Error::NoMemory`].
-pub fn load_operators(machine: &mut Vm) -> Result<(), Error> {
-    esl_stdlib::load_operators(machine).map_err(|_| Error::NoMemory("the part of the library for operators"))
-}
-
-/// Returns whether a machine has the functions of the library that serve operators.
-pub fn has_operators(machine: &Vm) -> bool {
-    esl_stdlib::has_operators(machine)
-}
-
 /// Has a machine write to its error output what happens to `failures`, `goals` or `tasks`. Nothing changes if
 /// `traces` is empty.
 ///

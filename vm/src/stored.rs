@@ -173,6 +173,17 @@ impl Vm {
         true
     }
 
+    /// Returns the number of the object that stands for a thing of the host with this identity, the same in
+    /// every process of the run; `None` if the program does not hold it.
+    pub fn number_of_thing(&self, identity: usize) -> Option<u64> {
+        self.names.opaques.number_of(identity)
+    }
+
+    /// Returns the datum of a thing of the host by that number.
+    pub fn thing_numbered(&self, number: u64) -> Option<Datum> {
+        self.names.opaques.numbered(number).cloned()
+    }
+
     /// Tells a new inbox of the inputs and of the handled signals, as the program has told the one before.
     fn tell_inbox(&self) {
         let inbox = &self.outside.inbox;

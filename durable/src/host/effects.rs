@@ -32,18 +32,20 @@ impl<H: Host> DurableHost<H> {
         call: HostCall<'_>,
         function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
-        if has_gone_object(call.arguments) {
-            let answer = match call.effect {
-                CallEffect::Closes => Ok(Datum::nil(Span::default())),
-                _ => Err(interrupted(call, None)),
-            };
+        let stand_in = self.lasting.stand_in(call.arguments);
+        if has_gone_object(stand_in.as_deref().unwrap_or(call.arguments)) {
+            let is_done = call.effect.is_done_by_restart();
+            let answer = if is_done { Ok(Datum::nil(Span::default())) } else { Err(interrupted(call, None)) };
             return self.live.answer_call(call, answer);
         }
+        // The journal has the arguments as the program has given them.
+        let function = &mut |given: &[Datum]| function(stand_in.as_deref().unwrap_or(given));
         match call.effect {
-            CallEffect::Local => return self.live.call(call, function),
+            // It opens nothing outside: operations do.
+            CallEffect::Local | CallEffect::Lasts => return self.live.call(call, function),
             // The close is an effect on the other end.
-            CallEffect::Closes if !self.log.commit() => return Err(refused_call()),
-            CallEffect::Closes => return self.live.call(call, function),
+            CallEffect::Closes | CallEffect::Releases if !self.log.commit() => return Err(refused_call()),
+            CallEffect::Closes | CallEffect::Releases => return self.live.call(call, function),
             CallEffect::Idempotent | CallEffect::Once => {}
         }
         let question = QuestionHash::of_call(call.name, call.arguments);
@@ -67,10 +69,12 @@ impl<H: Host> DurableHost<H> {
             return self.inbox.put(Incoming::Operation { number, news: News::Failed(refused_call()) });
         };
         self.log.note_open(open_call(call, number, action));
-        if has_gone_object(call.arguments) {
+        let stand_in = self.lasting.stand_in(call.arguments);
+        if has_gone_object(stand_in.as_deref().unwrap_or(call.arguments)) {
             return self.inbox.put(Incoming::Operation { number, news: after_restart(call, None) });
         }
-        self.live.begin(call, &mut |arguments, _| function(arguments, Some(action)));
+        let begin = &mut |given: &[Datum], _| function(stand_in.as_deref().unwrap_or(given), Some(action));
+        self.live.begin(call, begin);
     }
 
     /// Changes a file by the outside.

@@ -12,22 +12,23 @@ mod effects;
 
 use std::collections::{BTreeMap, HashSet};
 
-use esl_bytecode::datum::{Datum, DatumKind};
-use esl_bytecode::span::Span;
+use esl_bytecode::datum::Datum;
 use esl_host::{
     ActionId, Awaited, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, Inbox, Incoming,
     Input, News, NotedRecord, Output, Permit, ProcessSignal, QuestionHash, Recorder, RecordingHost,
-    ReplayHost, Right, Rights, RunCheck, Wake, WriteMode, has_gone_object,
+    RepeatedCall, ReplayHost, Right, Rights, RunCheck, Wake, WriteMode, has_gone_object,
 };
 
-use esl_replay::{JournalGeneration, JournalLife};
+use esl_replay::JournalGeneration;
 
 use super::control::{DurableControl, Resumed};
 use super::error::DurableError;
 use super::file_effect::{FileSize, complete_deletion, complete_request, complete_write, size_of};
 use super::interruption::{
-    after_restart, ended_operations, interrupted, last_question, news_of, open_call, refused, senders,
+    after_restart, ended_operations, interrupted, last_question, news_of, open_call, refused,
+    resumed_message, senders,
 };
+use super::lasting::LastingCalls;
 use super::log::JournalLog;
 use super::resume::Resumption;
 use super::upgrade::{Upgrade, UpgradeFailure};
@@ -38,6 +39,7 @@ pub struct DurableHost<H> {
     live: RecordingHost<H, JournalLog>,
     log: JournalLog,
     control: DurableControl,
+    lasting: LastingCalls,
     inbox: Inbox,
     /// The process that is about to begin, until it has begun.
     resumption: Option<Resumption>,
@@ -51,8 +53,6 @@ pub struct DurableHost<H> {
     interrupts: bool,
     /// Number of senders that are gone.
     lost: usize,
-    /// Greatest number of a question in the records.
-    asked: u64,
     /// The upgrade that is to be made when the run goes on.
     upgrade: Option<Upgrade>,
     /// The upgrade whose call is among the news for the machine, or under way.
@@ -64,7 +64,7 @@ impl<H: Host> DurableHost<H> {
     pub(crate) fn new(
         host: H,
         log: JournalLog,
-        control: DurableControl,
+        (control, lasting): (DurableControl, LastingCalls),
         records: std::sync::Arc<[NotedRecord]>,
         start: Option<&JournalGeneration>,
         resumption: Option<Resumption>,
@@ -74,7 +74,8 @@ impl<H: Host> DurableHost<H> {
         control.set_inbox(inbox.clone());
         let ended = ended_operations(&records);
         let lost = senders(&records, start.map_or(0, |start| start.senders as usize));
-        let asked = last_question(&records, start.map_or(0, |start| start.asked));
+        // Answers to questions of earlier processes are those of a replay.
+        inbox.number_questions_above(last_question(&records, start.map_or(0, |start| start.asked)));
         let early = (0..lost).map(|_| Incoming::SenderLeft).collect();
         let open = start.map_or(&[][..], |start| &start.open).iter();
         let open = open.filter(|call| !ended.contains(&call.number)).map(|call| (call.number, news_of(call)));
@@ -91,6 +92,7 @@ impl<H: Host> DurableHost<H> {
             live,
             log,
             control,
+            lasting,
             inbox,
             resumption,
             early,
@@ -98,7 +100,6 @@ impl<H: Host> DurableHost<H> {
             open,
             interrupts: false,
             lost,
-            asked,
             upgrade,
             upgrading: None,
         }
@@ -126,6 +127,8 @@ impl<H: Host> DurableHost<H> {
         // The upgrade is made before the program is told of its restart.
         let mut first = self.upgrade.take().map_or(Vec::new(), |upgrade| self.begin_upgrade(upgrade));
         if is_told {
+            // Those of this process come later.
+            first.push(Incoming::Unattended);
             first.push(resumed_message(&life, downtime));
         }
         let mut interrupted = usize::from(self.interrupts);
@@ -136,7 +139,9 @@ impl<H: Host> DurableHost<H> {
             }
         }
         self.log.forget_ended(&self.ended);
-        self.control.note_resumed(Resumed { life, downtime, interrupted, lost: self.lost });
+        // No program of a copy runs on.
+        let again = if self.control.is_copy() { 0 } else { self.lasting.begin_again(&self.inbox) };
+        self.control.note_resumed(Resumed { life, downtime, interrupted, lost: self.lost, again });
         first.append(&mut self.early);
         self.early = first;
         self.inbox.ring();
@@ -151,7 +156,7 @@ impl<H: Host> DurableHost<H> {
 
     /// Asks the machine for an upgrade. Returns the arrivals by which it is asked.
     fn begin_upgrade(&mut self, upgrade: Upgrade) -> Vec<Incoming> {
-        let (call, asked) = upgrade.ask(&self.inbox, self.asked);
+        let (call, asked) = upgrade.ask(&self.inbox);
         self.control.begin_upgrade(call);
         // There is no answer yet: the inbox is rung when it comes.
         let outcome = self.control.hear_upgrade(&self.inbox);
@@ -185,16 +190,6 @@ impl<H: Host> DurableHost<H> {
     }
 }
 
-/// Returns the message by which the program is told that it goes on in another process.
-fn resumed_message(life: &JournalLife, downtime: f64) -> Incoming {
-    let number = i64::try_from(life.number).unwrap_or(i64::MAX);
-    let arguments = vec![
-        Datum::new(DatumKind::Float(downtime), Span::default()),
-        Datum::integer(number, Span::default()),
-    ];
-    Incoming::Message { input: "*RESUMED*".into(), arguments }
-}
-
 /// Asks the host whose turn it is.
 macro_rules! ask {
     ($self:ident, $host:ident => $question:expr) => {
@@ -208,6 +203,46 @@ macro_rules! ask {
             answer
         }
     };
+}
+
+impl<H: Host> DurableHost<H> {
+    /// Makes a call of a function that returns at once, or takes its answer from the records.
+    fn make_call(
+        &mut self,
+        call: HostCall<'_>,
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
+        if self.enter() {
+            return self.call_outside(call, function);
+        }
+        let question = QuestionHash::of_call(call.name, call.arguments);
+        match self.past.take_intent(question) {
+            Some(_) if call.effect.may_be_repeated() && self.enter() => self.call_outside(call, function),
+            Some(intent) if self.interrupts() => {
+                self.live.answer_call(call, Err(interrupted(call, Some(intent.action))))
+            }
+            _ => ask!(self, host => host.call(call, function)),
+        }
+    }
+
+    /// Begins an operation, or leaves it to the records.
+    fn begin_call(&mut self, call: HostCall<'_>, function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
+        if self.enter() {
+            return self.begin_outside(call, function);
+        }
+        if let (Some(intent), Some(number)) = (self.past.expect_intent(call), call.operation)
+            && !self.ended.contains(&number)
+        {
+            let is_repeated = call.effect.may_be_repeated() && !has_gone_object(call.arguments);
+            if is_repeated {
+                function(call.arguments, Some(intent.action));
+            }
+            let news = (!is_repeated).then(|| after_restart(call, Some(intent.action)));
+            self.log.note_open(open_call(call, number, intent.action));
+            self.open.insert(number, news);
+        }
+        self.ring_at_end();
+    }
 }
 
 impl<H: Host> Host for DurableHost<H> {
@@ -368,35 +403,27 @@ impl<H: Host> Host for DurableHost<H> {
         call: HostCall<'_>,
         function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
-        if self.enter() {
-            return self.call_outside(call, function);
-        }
-        let question = QuestionHash::of_call(call.name, call.arguments);
-        match self.past.take_intent(question) {
-            Some(_) if call.effect.may_be_repeated() && self.enter() => self.call_outside(call, function),
-            Some(intent) if self.interrupts() => {
-                self.live.answer_call(call, Err(interrupted(call, Some(intent.action))))
-            }
-            _ => ask!(self, host => host.call(call, function)),
-        }
+        let answer = self.make_call(call, function);
+        self.lasting.hear_call(call, &answer);
+        answer
+    }
+
+    fn next_repeated(&mut self) -> Option<RepeatedCall> {
+        if self.is_live() { self.lasting.next() } else { None }
+    }
+
+    fn permits_repeated(&mut self, right: Right, object: &str) -> bool {
+        matches!(self.live.host_mut().permit(right, object, &[]), Permit::Granted(_))
+    }
+
+    fn answer_repeated(&mut self, answer: Result<Datum, HostFailure>) {
+        let answer = answer.as_ref().map(std::slice::from_ref);
+        self.lasting.answer(answer, &self.inbox, &self.control);
     }
 
     fn begin(&mut self, call: HostCall<'_>, function: &mut dyn FnMut(&[Datum], Option<ActionId>)) {
-        if self.enter() {
-            return self.begin_outside(call, function);
-        }
-        if let (Some(intent), Some(number)) = (self.past.expect_intent(call), call.operation)
-            && !self.ended.contains(&number)
-        {
-            let is_repeated = call.effect.may_be_repeated() && !has_gone_object(call.arguments);
-            if is_repeated {
-                function(call.arguments, Some(intent.action));
-            }
-            let news = (!is_repeated).then(|| after_restart(call, Some(intent.action)));
-            self.log.note_open(open_call(call, number, intent.action));
-            self.open.insert(number, news);
-        }
-        self.ring_at_end();
+        self.begin_call(call, function);
+        self.lasting.hear_begin(call);
     }
 
     fn inbox(&self) -> Inbox {
@@ -433,6 +460,7 @@ impl<H: Host> Host for DurableHost<H> {
                 let come = self.inbox.take();
                 std::mem::take(&mut self.early).into_iter().chain(come).for_each(|one| self.inbox.put(one));
             }
+            self.lasting.take_news(&self.inbox, &self.control);
             let contents = self.live.poll(round);
             // An arrival, such as the outcome of an effect, cannot be had a second time.
             if !contents.is_empty() {
@@ -446,6 +474,7 @@ impl<H: Host> Host for DurableHost<H> {
             self.ring_at_end();
             contents
         };
+        self.lasting.hear_news(&contents);
         if pauses || comes_back {
             contents.push(Incoming::Stop);
         } else if contents.is_empty() && self.is_live() && self.control.takes_interruption() {

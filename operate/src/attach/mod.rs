@@ -21,10 +21,11 @@ mod session;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
+use esl::program::{TELL_OPERATOR, WRITE_OPERATOR};
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_host::HostOperation;
+use esl_host::{CallEffect, HostOperation};
 use esl_vm::embed::HostFunction;
 use esl_vm::vm::Vm;
 use esl_world::{NoEventLoop, TlsIdentity};
@@ -85,15 +86,24 @@ pub(super) fn serve(
         }
         Ok(Datum::nil(Default::default()))
     };
-    machine.add_host_function(TELL, HostFunction::AtOnce(Box::new(tell)));
+    let (tell, local) = (HostFunction::AtOnce(Box::new(tell)), CallEffect::Local);
+    machine.add_function_with(TELL_OPERATOR, tell, &[], local);
     let known = outboxes.clone();
     let write = move |operation: HostOperation| begin_writing(&known, operation);
-    machine.add_host_function(WRITE, HostFunction::Operation(Box::new(write)));
+    machine.add_function_with(WRITE_OPERATOR, HostFunction::Operation(Box::new(write)), &[], local);
     let places = OperatorRole::ALL.map(|_| Arc::new(Semaphore::new(SESSIONS)));
     let handle = SessionsHandle(outboxes.clone());
-    let attendance = Attendance { scope, outboxes, sessions: AtomicU64::new(0), places };
+    let sessions = AtomicU64::new(first_session());
+    let attendance = Attendance { scope, outboxes, sessions, places };
     esl_world::spawn(accept(entrance, Arc::new(attendance)))?;
     Ok(handle)
+}
+
+/// Returns a number below those of the sessions of this process. A run that goes on in it may have tasks that
+/// speak to sessions of an earlier one.
+fn first_session() -> u64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    since.map_or(0, |time| u64::try_from(time.as_micros()).unwrap_or(0))
 }
 
 /// The sessions of a run, for the thread that runs the machine.
@@ -116,11 +126,6 @@ impl SessionsHandle {
         self.0.are_empty()
     }
 }
-
-/// Name of the function by which the library tells operators something at once.
-const TELL: &str = "%TELL-OPERATOR";
-/// Name of the operation by which the library tells operators something when there is room for it.
-const WRITE: &str = "%WRITE-OPERATOR";
 
 /// Returns the arguments of either function: the outbox of a session that still exists, and a packet.
 fn told(outboxes: &Outboxes, arguments: &[Datum]) -> Option<(Outbox, WireForm)> {
@@ -178,7 +183,7 @@ fn too_large(form: &WireForm) -> WireForm {
 struct Attendance {
     scope: RunScope,
     outboxes: Outboxes,
-    /// Number of sessions so far.
+    /// Number of the last session.
     sessions: AtomicU64,
     /// Places for sessions, by the index of the role.
     places: [Arc<Semaphore>; OperatorRole::ALL.len()],

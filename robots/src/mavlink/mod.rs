@@ -153,7 +153,8 @@ fn add_links(rows: &mut HostRows) {
             let core = LinkCore::new((system, component), version == 1, input, sender);
             Ok(HostHandle::new(made, MavlinkLink(Arc::new(core))))
         },
-    );
+    )
+    .lasts();
     rows.operation(
         spawned,
         "%MAVLINK-OPEN",
@@ -163,7 +164,8 @@ fn add_links(rows: &mut HostRows) {
             transport::open(&link.0, &kind, &address).await.map(i64::from)
         },
     )
-    .needs(Right::Net, "address");
+    .needs(Right::Net, "address")
+    .lasts();
     rows.operation(
         spawned,
         "%MAVLINK-OPEN-SERIAL",
@@ -173,7 +175,8 @@ fn add_links(rows: &mut HostRows) {
             transport::open_serial(&link.0, path, baud).await
         },
     )
-    .needs(Right::Serial, "path");
+    .needs(Right::Serial, "path")
+    .lasts();
     rows.at_once("%MAVLINK-CLOSE", ["link"], "Closes LINK.", |link: HostHandle<MavlinkLink>| {
         link.0.close();
         Ok(())
@@ -197,7 +200,8 @@ fn add_links(rows: &mut HostRows) {
             link.0.sign(Signing::new(bytes, number, accepts_unsigned));
             Ok(())
         },
-    );
+    )
+    .lasts();
     rows.at_once(
         "%MAVLINK-TARGET",
         ["link", "system", "component"],
@@ -206,7 +210,8 @@ fn add_links(rows: &mut HostRows) {
             link.0.set_target((system, component));
             Ok(())
         },
-    );
+    )
+    .lasts();
     rows.at_once(
         "%MAVLINK-COUNTS",
         ["link"],
@@ -251,7 +256,8 @@ fn add_messages(rows: &mut HostRows) {
             made += 1;
             Ok(HostHandle::new(made, link.0.subscribe(input, numbers, source)?))
         },
-    );
+    )
+    .lasts();
     rows.at_once(
         "%MAVLINK-UNSUBSCRIBE",
         ["subscription"],
@@ -260,7 +266,8 @@ fn add_messages(rows: &mut HostRows) {
             subscription.end();
             Ok(())
         },
-    );
+    )
+    .closes();
     rows.at_once(
         "%MAVLINK-SEND",
         ["link", "name", "fields", "system", "component"],

@@ -56,7 +56,8 @@ fn add_types(rows: &mut HostRows, types: &Types) {
             Ok(())
         },
     )
-    .needs(Right::Read, "path");
+    .needs(Right::Read, "path")
+    .lasts();
     let known = types.clone();
     rows.at_once(
         "%ROS-DEFINE",
@@ -64,7 +65,8 @@ fn add_types(rows: &mut HostRows, types: &Types) {
         "Makes TEXT the definition of the type NAME.",
         move |name: String, text: String| Ok(known.define(&name, &text)?),
     )
-    .everywhere();
+    .everywhere()
+    .lasts();
     let known = types.clone();
     rows.at_once(
         "%ROS-COMPLETE",
@@ -171,7 +173,8 @@ fn add_nodes(rows: &mut HostRows) {
                 Ok(HostHandle::new(number, node))
             }
         },
-    );
+    )
+    .lasts();
     rows.at_once("%ROS-END", ["node"], "Ends NODE.", |node: HostHandle<RosNode>| {
         node.end();
         Ok(())
@@ -210,7 +213,8 @@ fn add_topics(rows: &mut HostRows, types: &Types) {
             let (number, of_type) = (made, types::message(&known, &of_type));
             async move { Ok(HostHandle::new(number, topic::advertise(&node, name, of_type?, qos).await?)) }
         },
-    );
+    )
+    .lasts();
     rows.operation(
         ready_soon,
         "%ROS-PUBLISH",
@@ -246,7 +250,8 @@ fn add_topics(rows: &mut HostRows, types: &Types) {
                 Ok(HostHandle::new(number, entity))
             }
         },
-    );
+    )
+    .lasts();
 }
 
 /// Adds the functions of time.
@@ -287,7 +292,8 @@ fn add_services(rows: &mut HostRows, types: &Types) {
             let (number, of_type) = (made, types::service(&known, &of_type));
             async move { Ok(HostHandle::new(number, service::client(&node, name, of_type?, qos).await?)) }
         },
-    );
+    )
+    .lasts();
     rows.operation(
         spawned,
         "%ROS-CALL",
@@ -315,7 +321,8 @@ fn add_services(rows: &mut HostRows, types: &Types) {
                 Ok(HostHandle::new(number, entity))
             }
         },
-    );
+    )
+    .lasts();
     rows.operation(
         ready_soon,
         "%ROS-RESPOND",

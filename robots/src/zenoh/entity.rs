@@ -135,6 +135,8 @@ pub(crate) async fn watch_alive(
     key: String,
 ) -> Result<DeclaredEntity, HostFailure> {
     let delivery = InputDelivery::begin(input)?;
+    // Signs that an earlier declaration has seen may be gone.
+    delivery.put(0, || vec![Keyword("BEGIN").into_datum()]);
     let delivering = delivery.clone();
     let deliver = move |sample: Sample| {
         let arguments = || vec![kind(&sample).into_datum(), sample.key_expr().as_str().into_datum()];

@@ -62,7 +62,8 @@ fn add_sessions(rows: &mut HostRows) {
     rows.at_once("%ZENOH-NEW", [], "Returns a session that is not open.", move || {
         made += 1;
         Ok(HostHandle::new(made, ZenohSession::default()))
-    });
+    })
+    .lasts();
     rows.at_once(
         "%ZENOH-CONFIGURE",
         ["session", "text"],
@@ -88,7 +89,8 @@ fn add_sessions(rows: &mut HostRows) {
                 .collect();
             endpoints
         },
-    );
+    )
+    .lasts();
     rows.at_once(
         "%ZENOH-PARTS",
         ["endpoint"],
@@ -114,7 +116,8 @@ fn add_sessions(rows: &mut HostRows) {
             })
         },
     )
-    .needs(Right::Net, "address");
+    .needs(Right::Net, "address")
+    .lasts();
     rows.at_once(
         "%ZENOH-SOCKET",
         ["session", "side", "path"],
@@ -127,7 +130,8 @@ fn add_sessions(rows: &mut HostRows) {
         },
     )
     .needs(Right::Read, "path")
-    .needs(Right::Write, "path");
+    .needs(Right::Write, "path")
+    .lasts();
     rows.at_once(
         "%ZENOH-SCOUT",
         ["session", "address"],
@@ -136,7 +140,8 @@ fn add_sessions(rows: &mut HostRows) {
             session.configure(|config| config.scout(&address))
         },
     )
-    .needs(Right::Net, "address");
+    .needs(Right::Net, "address")
+    .lasts();
     rows.operation(
         spawned,
         "%ZENOH-OPEN",
@@ -147,7 +152,8 @@ fn add_sessions(rows: &mut HostRows) {
          input: HostInput,
          mode: Option<String>,
          milliseconds: u64| async move { session.open(mode, milliseconds, input, sender).await },
-    );
+    )
+    .lasts();
     rows.operation(
         spawned,
         "%ZENOH-CLOSE",
@@ -221,7 +227,8 @@ fn add_entities(rows: &mut HostRows) {
                 }
             }
         },
-    );
+    )
+    .lasts();
     rows.operation(
         spawned,
         "%ZENOH-SERVE",
@@ -237,7 +244,8 @@ fn add_entities(rows: &mut HostRows) {
                 }
             }
         },
-    );
+    )
+    .lasts();
     rows.operation(spawned, "%ZENOH-ALIVE", ["session", "key"], "Declares a sign of life.", {
         let next = next.clone();
         move |session: HostHandle<ZenohSession>, key: String| {
@@ -247,7 +255,8 @@ fn add_entities(rows: &mut HostRows) {
                 Ok(HostHandle::new(number, entity::declare_alive(&session, key).await?))
             }
         }
-    });
+    })
+    .lasts();
     rows.operation(
         spawned,
         "%ZENOH-WATCH",
@@ -260,7 +269,8 @@ fn add_entities(rows: &mut HostRows) {
                 Ok(HostHandle::new(number, entity::watch_alive(&session, input, key).await?))
             }
         },
-    );
+    )
+    .lasts();
     rows.at_once(
         "%ZENOH-END",
         ["entity"],

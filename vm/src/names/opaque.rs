@@ -83,6 +83,16 @@ impl Names {
 type StoredOpaque = (u64, (Value, (String, String)));
 
 impl Opaques {
+    /// Returns the number of the object that stands for a thing with this identity.
+    pub(crate) fn number_of(&self, identity: usize) -> Option<u64> {
+        self.numbers.get(&(identity as u64)).copied()
+    }
+
+    /// Returns the datum of the thing with this number.
+    pub(crate) fn numbered(&self, number: u64) -> Option<&Datum> {
+        self.held.get(&number).map(|(_, datum)| datum)
+    }
+
     /// Returns the number of things held.
     pub(crate) fn len(&self) -> usize {
         self.held.len()

@@ -10,6 +10,7 @@ use esl_heap::state::{StateSink, Stated};
 use esl_host::machine::{Asked, Canceller, Console};
 use esl_host::{
     ActionId, CallEffect, Host, HostCall, HostFailure, HostFunction, HostOperation, Inbox, Need, Output,
+    RepeatedCall,
 };
 use indexmap::IndexMap;
 use rustc_hash::FxBuildHasher;
@@ -239,6 +240,33 @@ impl Outside {
         let operation = HostOperation::new(number, arguments.to_vec(), self.inbox.clone(), canceller);
         function(operation.with_action(Some(action)));
         true
+    }
+
+    /// Makes the calls of an earlier process again that the host asks for.
+    pub(crate) fn repeat_calls(&mut self) {
+        while let Some(RepeatedCall { number, name, arguments }) = self.host.next_repeated() {
+            let Some(given) = self.functions.get_mut(&name) else {
+                self.host.answer_repeated(Err(HostFailure::new("NOT-IN-THIS-WORLD", name)));
+                continue;
+            };
+            let host = &mut self.host;
+            let mut is_refused = |need: &Need| match arguments.get(need.argument).map(Datum::kind) {
+                Some(DatumKind::String(object)) => !host.permits_repeated(need.right, object.as_ref()),
+                _ => false,
+            };
+            if given.needs.iter().any(&mut is_refused) {
+                let failure = HostFailure::new("NOT-PERMITTED", "this process lacks a right");
+                self.host.answer_repeated(Err(failure));
+                continue;
+            }
+            match &mut given.function {
+                HostFunction::AtOnce(function) => self.host.answer_repeated(function(&arguments)),
+                HostFunction::Operation(function) => {
+                    let canceller = Canceller::default();
+                    function(HostOperation::new(number, arguments, self.inbox.clone(), canceller));
+                }
+            }
+        }
     }
 
     /// Calls `visit` with every value.

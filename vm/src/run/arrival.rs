@@ -27,6 +27,7 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
             stops |= take_in_one(vm, incoming);
         }
     }
+    vm.outside.repeat_calls();
     serve_inspections(vm);
     stops
 }
@@ -85,6 +86,7 @@ fn take_in_one(vm: &mut Vm, incoming: Incoming) -> bool {
             vm.scheduler.is_paused &= vm.outside.senders > 0;
         }
         Incoming::Attended => vm.outside.attendance = ExpectedOperators::MayCome,
+        Incoming::Unattended => vm.outside.attendance = ExpectedOperators::None,
         // That it waits for messages is not worth a report.
         Incoming::Hosted => vm.outside.attendance = ExpectedOperators::IsAwaited,
     }

@@ -121,7 +121,7 @@ impl ServerSlot {
 
 /// Adds the functions of servers.
 pub(super) fn add(rows: &mut HostRows) {
-    rows.constructor::<ServerSlot>("%HTTP-NEW-SERVER", "Returns a server that does not listen.");
+    rows.constructor::<ServerSlot>("%HTTP-NEW-SERVER", "Returns a server that does not listen.").lasts();
     rows.operation(
         spawned,
         "%HTTP-LISTEN",
@@ -146,7 +146,8 @@ pub(super) fn add(rows: &mut HostRows) {
     .needs(Right::Net, "address")
     .needs(Right::Read, "certificate")
     .needs(Right::Read, "key")
-    .needs(Right::Read, "clients");
+    .needs(Right::Read, "clients")
+    .lasts();
     rows.at_once(
         "%HTTP-ANSWER",
         ["server", "request", "status", "headers", "body"],
@@ -166,7 +167,7 @@ pub(super) fn add(rows: &mut HostRows) {
             Ok(())
         },
     )
-    .closes();
+    .releases();
     rows.operation(
         spawned,
         "%HTTP-CLOSE-SERVER",

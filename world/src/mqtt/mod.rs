@@ -9,6 +9,7 @@
 //! is sent that the protocol does not allow.
 
 use std::collections::{HashMap, HashSet, VecDeque};
+use std::hash::{BuildHasher, RandomState};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -170,7 +171,7 @@ impl FromArgument for Will {
 /// Returns the functions of `:mqtt`.
 pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     let mut rows = HostRows::new(inbox);
-    rows.constructor::<Client>("%MQTT-NEW", "Returns a client that is not connected.");
+    rows.constructor::<Client>("%MQTT-NEW", "Returns a client that is not connected.").lasts();
     rows.operation(
         spawned,
         "%MQTT-OPEN",
@@ -180,7 +181,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         |sender: Sender,
          client: HostHandle<Client>,
          address: String,
-         id: String,
+         id: Option<String>,
          keep_alive: u16,
          credentials: Option<(String, Option<String>)>,
          will: Option<Will>,
@@ -191,7 +192,8 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         },
     )
     .needs(Right::Net, "address")
-    .needs(Right::Read, "ca-file");
+    .needs(Right::Read, "ca-file")
+    .lasts();
     rows.operation(
         spawned,
         "%MQTT-PUBLISH",
@@ -205,7 +207,8 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
         ["client", "input", "filter", "qos", "as-bytes"],
         "Signals the input with the name INPUT with topic, payload and retention of messages for FILTER.",
         subscribe,
-    );
+    )
+    .lasts();
     rows.at_once(
         "%MQTT-PROBLEM",
         ["client"],
@@ -235,13 +238,15 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
 /// Returns the options of a client.
 fn options(
     address: &str,
-    id: String,
+    id: Option<String>,
     keep_alive: u16,
     credentials: Option<(String, Option<String>)>,
     will: Option<Will>,
 ) -> Result<MqttOptions, HostFailure> {
     let (host, port) = address.rsplit_once(':').unwrap_or((address, "1883"));
     let port = port.parse().map_err(mqtt_failure)?;
+    // A broker ends the connection of a client when another one comes by its name.
+    let id = id.unwrap_or_else(|| format!("esl-{:016x}", RandomState::new().hash_one(std::process::id())));
     check_text("name of the client", &id)?;
     let mut options = MqttOptions::new(id, host.trim_matches(['[', ']']), port);
     options.set_keep_alive(Duration::from_secs(keep_alive.into()));

@@ -118,7 +118,7 @@ impl Following {
 /// Returns the functions of `watch-path`, which the library calls by their names.
 pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     let mut rows = HostRows::new(inbox);
-    rows.constructor::<WatchSlot>("%WATCH-NEW", "Returns a watch of no path.");
+    rows.constructor::<WatchSlot>("%WATCH-NEW", "Returns a watch of no path.").lasts();
     rows.at_once("%WATCH-CLOSE", ["watch"], "Ends WATCH.", |watch: HostHandle<WatchSlot>| {
         watch.set(None);
         Ok(())
@@ -151,6 +151,7 @@ pub(crate) fn rows(inbox: &Inbox) -> HostRows {
             }
         },
     )
-    .needs(Right::Read, "path");
+    .needs(Right::Read, "path")
+    .lasts();
     rows
 }

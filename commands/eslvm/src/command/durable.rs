@@ -14,7 +14,7 @@ use esl_command::{
 use esl_compiler::diagnostic::{Format, Renderer, Sources};
 use esl_durable::{
     Downtime, Durability, DurableError, DurableOptions, DurableRun, DurableState, Resumed, SnapshotEvery,
-    UpgradeReport, look,
+    UpgradeReport, fork, look,
 };
 use esl_replay::RunSetup;
 use esl_vm::vm::Tier;
@@ -32,7 +32,7 @@ pub(crate) struct StateOptions {
     /// Make the run durable: keep its journal in this folder, or go on with the run of this folder. Needs the
     /// same program each time
     #[arg(long, value_name = "FOLDER", conflicts_with_all = [
-        "schedule", "record", "coverage", "profile", "timeline", "mcap", "foxglove", "metrics", "listen", "monitor",
+        "schedule", "record", "coverage", "profile", "timeline", "mcap", "foxglove",
     ])]
     pub(crate) state: Option<std::path::PathBuf>,
     /// Let a durable run survive the end of its process, or loss of power as well, for which it waits for the
@@ -111,6 +111,12 @@ pub(crate) struct LookOptions {
     /// Show the changes of this program, and try an upgrade to it on a copy of the run
     #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["facts", "tasks", "log"])]
     upgrade: Option<std::path::PathBuf>,
+    /// Copy the run into this folder: a run of its own, for experiments
+    #[arg(long, value_name = "COPY", conflicts_with_all = ["facts", "tasks", "log", "upgrade"])]
+    fork: Option<std::path::PathBuf>,
+    /// Copy the run as it was so long before its last record, such as 90s or 2h
+    #[arg(long, value_name = "TIME", requires = "fork", value_parser = humantime::parse_duration)]
+    back: Option<Duration>,
     #[command(flatten)]
     modules: LibraryOption,
     /// Folder of a durable run
@@ -218,6 +224,7 @@ pub(crate) fn run_durable(
         return Ok(status);
     }
     let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+    let served = reports.operate.begin(&mut machine, &name)?;
     let managed = tell_manager(&machine, &name)?;
     let started = std::time::Instant::now();
     let main = match run.restore(&mut machine).map_err(refuse)? {
@@ -234,9 +241,10 @@ pub(crate) fn run_durable(
         return Ok(SUCCESS);
     }
     let summary = program::finish(&mut machine, main, outcome);
-    drop(managed);
     run.check().map_err(refuse)?;
     let status = summary.ended.exit_status();
+    served.end(&machine, summary.ended, status, summary.report.as_deref());
+    drop((served, managed));
     run.end(&machine, status).map_err(refuse)?;
     match summary.ended {
         program::Ended::BudgetSpent => {
@@ -259,15 +267,17 @@ pub(crate) fn run_durable(
 
 /// Reports that a run goes on, and the number of things that are gone with the earlier process.
 fn say_resumed(resumed: &Resumed) {
-    let Resumed { life, downtime, interrupted, lost } = *resumed;
+    let Resumed { life, downtime, interrupted, lost, again } = *resumed;
     let mut text =
         format!("the run goes on in process {}, {downtime:.1} s after the last record", life.number);
     if interrupted > 0 {
         text += &format!("; calls interrupted: {interrupted}");
     }
-    if lost > 0 {
+    if again > 0 {
+        text += "; servers, clients and subscriptions are opened again";
+    } else if lost > 0 {
         text += &format!(
-            "; closed connections and servers that signalled inputs: {lost}; the program has to open them again"
+            "; gone: {lost} connections or operators that signalled inputs; the program has to open its own again"
         );
     }
     complain(text);
@@ -305,6 +315,9 @@ pub(crate) fn run_state(options: &LookOptions) -> Result<u8, u8> {
     if let Some(program) = &options.upgrade {
         return check_upgrade(&options.folder, program, &options.modules.library);
     }
+    if let Some(copy) = &options.fork {
+        return make_fork(&options.folder, copy, options.back.unwrap_or_default());
+    }
     let mut state = look(&options.folder).map_err(|error| refused(&error))?;
     match &options.facts {
         Some(name) => return print_facts(&mut state, name),
@@ -335,6 +348,18 @@ fn check_upgrade(folder: &Path, file: &Path, library: &[std::path::PathBuf]) -> 
     say!("{changes}");
     let report = run.try_upgrade(&program, &changes).map_err(refuse)?;
     say!("{}", upgrade_text("on a copy of the run", &report));
+    Ok(SUCCESS)
+}
+
+/// Copies a run as it was. Returns the exit status.
+fn make_fork(folder: &Path, copy: &Path, back: Duration) -> Result<u8, u8> {
+    let made = fork(folder, copy, back).map_err(|error| refused(&error))?;
+    let back = humantime::format_duration(Duration::from_millis(made.back.as_millis() as u64));
+    say!(
+        "{} has the run as it was {back} before its last record, in process {}; `eslvm run --state` goes on with it",
+        copy.display(),
+        made.processes
+    );
     Ok(SUCCESS)
 }
 
@@ -399,7 +424,7 @@ fn print_facts(state: &mut DurableState, name: &str) -> Result<u8, u8> {
 fn print_state(state: &mut DurableState) {
     let survey = state.survey(&SurveyRequest { data: true, ..SurveyRequest::default() });
     let file = state.program_file.first().map_or("standard input", String::as_str);
-    let lives = state.lives.iter().filter(|life| !life.is_pause).count();
+    let process = state.lives.last().map_or(0, |life| life.number);
     let standing = match (state.ended, state.lives.last()) {
         (Some(status), _) => format!("ended with status {status}"),
         (None, Some(last)) if last.is_asleep => "asleep".into(),
@@ -409,7 +434,7 @@ fn print_state(state: &mut DurableState) {
     let facts: usize = survey.relations.iter().map(|relation| relation.facts).sum();
     say!("program: {file}");
     say!("machine: {}", state.identity);
-    say!("run: {standing}, tick {}, process {lives}", state.ticks);
+    say!("run: {standing}, tick {}, process {process}", state.ticks);
     say!("tasks: {}", survey.figures.tasks.iter().sum::<u64>());
     say!("facts: {facts} in {} relations", survey.relations.len());
     say!(

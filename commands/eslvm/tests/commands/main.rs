@@ -20,6 +20,8 @@ mod deadlock;
 mod documents;
 #[cfg(unix)]
 mod durable;
+mod durable_operators;
+mod durable_services;
 mod durable_upgrades;
 mod endings;
 mod examples;

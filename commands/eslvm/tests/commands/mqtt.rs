@@ -44,25 +44,38 @@ fn start_broker(program: &str, folder: &Folder, more: &str) -> (Broker, u16) {
         // The port is free until another process takes it, in which case the broker ends.
         let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
         let port = port.expect("there is a free port").port();
-        let settings = format!("listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n{more}");
-        let settings = folder.file("broker.conf", settings);
-        let child = Command::new(program)
-            .args(["-c", &settings])
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn();
-        let mut broker = Broker(child.expect("the broker can be started"));
-        let begun = Instant::now();
-        while begun.elapsed() < Duration::from_secs(60) && broker.0.try_wait().is_ok_and(|end| end.is_none())
-        {
-            if TcpStream::connect(("127.0.0.1", port)).is_ok() {
-                return (broker, port);
-            }
-            std::thread::sleep(Duration::from_millis(20));
+        if let Some(broker) = start_at(program, folder, more, port) {
+            return (broker, port);
         }
     }
     panic!("no broker could be started");
+}
+
+/// Starts a broker again where another one has listened.
+pub(crate) fn start_broker_at(folder: &Folder, port: u16) -> Broker {
+    let program = broker_program().expect("there was one");
+    start_at(program, folder, "", port).expect("the port is free again")
+}
+
+/// Starts a broker on a port of the loopback, and waits until it listens; `None` if it ends before.
+fn start_at(program: &str, folder: &Folder, more: &str, port: u16) -> Option<Broker> {
+    let settings = format!("listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n{more}");
+    let settings = folder.file("broker.conf", settings);
+    let child = Command::new(program)
+        .args(["-c", &settings])
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
+    let mut broker = Broker(child.expect("the broker can be started"));
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_secs(60) && broker.0.try_wait().is_ok_and(|end| end.is_none()) {
+        if TcpStream::connect(("127.0.0.1", port)).is_ok() {
+            return Some(broker);
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    None
 }
 
 /// Returns the lines that a program prints, which may reach a broker and is given its port.
