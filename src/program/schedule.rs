@@ -5,13 +5,14 @@
 //! machine 1-03a7c55e
 //! program 5d2c01ff
 //! grain changes
-//! timers idle
+//! timers idle aborts 1
 //! turn 100000
 //! choices 0 1 0 0 2
 //! end
 //! ```
 //!
-//! Behind the grain, `strict` means a program that is compiled with points. The machine is the epoch of its
+//! Behind the grain, `strict` means a program that is compiled with points; behind the timers, the number of
+//! aborts by an operator is left out if there are none. The machine is the epoch of its
 //! behaviour and a checksum of its library: on another one, choices lead elsewhere.
 
 use std::fmt;
@@ -51,6 +52,8 @@ pub struct Schedule {
     /// Whether tasks stop at the points of the program, which is compiled with them.
     strict: bool,
     timers: TimerGrain,
+    /// Most aborts by an operator.
+    aborts: u32,
     turn: u32,
     choices: Vec<u32>,
 }
@@ -86,8 +89,9 @@ impl std::error::Error for ScheduleError {}
 impl Schedule {
     /// Returns the schedule with these choices, which an exploration with these settings has found.
     pub fn new(program: &Program, settings: &Settings, choices: Vec<u32>) -> Schedule {
-        let Settings { grain, strict, timers, turn, .. } = *settings;
-        Schedule { machine: this_machine(), program: checksum(program), grain, strict, timers, turn, choices }
+        let Settings { grain, strict, timers, aborts, turn, .. } = *settings;
+        let (machine, program) = (this_machine(), checksum(program));
+        Schedule { machine, program, grain, strict, timers, aborts, turn, choices }
     }
 
     /// Parses the text of a file.
@@ -117,7 +121,9 @@ impl Schedule {
         let (grain, strict) = grain.strip_suffix(" strict").map_or((grain, false), |grain| (grain, true));
         let grain = Grain::from_name(grain).ok_or(wrong(4, "`changes`, `reads`, `variables` or `ticks`"))?;
         let timers = field(5, "timers", "`timers idle` or `timers any`")?;
+        let (timers, aborts) = timers.split_once(" aborts ").unwrap_or((timers, "0"));
         let timers = TimerGrain::from_name(timers).ok_or(wrong(5, "`idle` or `any`"))?;
+        let aborts = aborts.parse().map_err(|_| wrong(5, "`aborts` and a number"))?;
         let turn = field(6, "turn", "`turn` and a number of ticks")?;
         let turn = turn.parse().ok().filter(|&turn| turn > 0).ok_or(wrong(6, "a number of ticks"))?;
         let words = field(7, "choices", "`choices` and numbers")?.split_ascii_whitespace();
@@ -127,7 +133,7 @@ impl Schedule {
         if !is_whole {
             return Err(wrong(8, "`end`, and nothing more"));
         }
-        Ok(Schedule { machine, program, grain, strict, timers, turn, choices })
+        Ok(Schedule { machine, program, grain, strict, timers, aborts, turn, choices })
     }
 
     /// Returns whether the schedule was found by a machine that behaves as this one does.
@@ -142,8 +148,8 @@ impl Schedule {
 
     /// Returns the settings with which the choices lead to where they were found.
     pub fn settings(&self) -> Settings {
-        let Schedule { grain, strict, timers, turn, .. } = *self;
-        Settings { grain, strict, timers, turn, ..Settings::default() }
+        let Schedule { grain, strict, timers, aborts, turn, .. } = *self;
+        Settings { grain, strict, timers, aborts, turn, ..Settings::default() }
     }
 
     /// Returns whether it is of the program as [`compile_with_points`](super::compile_with_points) compiles
@@ -164,7 +170,11 @@ impl fmt::Display for Schedule {
         let strict = if self.strict { " strict" } else { "" };
         let (epoch, library) = self.machine;
         write!(f, "{HEADER}\nmachine {epoch}-{library:08x}\nprogram {:08x}\n", self.program)?;
-        write!(f, "grain {grain}{strict}\ntimers {timers}\nturn {}\nchoices", self.turn)?;
+        write!(f, "grain {grain}{strict}\ntimers {timers}")?;
+        if self.aborts > 0 {
+            write!(f, " aborts {}", self.aborts)?;
+        }
+        write!(f, "\nturn {}\nchoices", self.turn)?;
         self.choices.iter().try_for_each(|choice| write!(f, " {choice}"))?;
         writeln!(f, "\n{END}")
     }
@@ -197,6 +207,9 @@ mod tests {
         let strict = good.replace("reads", "reads strict");
         let schedule = Schedule::parse(&strict).expect("it is a schedule");
         assert_eq!((schedule.to_string(), schedule.is_strict()), (strict, true));
+        let aborts = good.replace("any", "any aborts 2");
+        let schedule = Schedule::parse(&aborts).expect("it is a schedule");
+        assert_eq!((schedule.to_string(), schedule.settings().aborts), (aborts, 2));
         let line = |text: &str| match Schedule::parse(text) {
             Err(ScheduleError::Line { line, .. }) => line,
             other => panic!("{text}: {other:?}"),
@@ -204,7 +217,13 @@ mod tests {
         assert_eq!(Schedule::parse("(print 1)"), Err(ScheduleError::Header));
         assert_eq!(Schedule::parse("esl-schedule 1\nprogram 00ff00ff\n"), Err(ScheduleError::Version));
         assert_eq!(line("esl-schedule 2\n"), 2);
-        let wrong = [("1-", "1/", 2), ("00ff00ff", "none", 3), ("reads", "all", 4), ("any", "some", 5)];
+        let wrong = [
+            ("1-", "1/", 2),
+            ("00ff00ff", "none", 3),
+            ("reads", "all", 4),
+            ("any", "some", 5),
+            ("any", "any aborts", 5),
+        ];
         let further = [("500", "0", 6), ("3", "x", 7), ("choices", "choice", 7), ("end", "", 8)];
         for (right, wrong, number) in wrong.into_iter().chain(further) {
             assert_eq!(line(&good.replace(right, wrong)), number, "{wrong}");

@@ -234,6 +234,7 @@ list_state! { Points {
     found_raced: Process,
     is_timed: Process,
     was_hit: Process,
+    requested: Process,
     has_guards: Process,
     asked: Run,
     chosen: Run,

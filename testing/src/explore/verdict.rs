@@ -27,6 +27,8 @@ pub struct ExplorationScope {
     pub grain: Grain,
     /// When timers fired.
     pub timers: TimerGrain,
+    /// Most aborts of a schedule by an operator.
+    pub aborts: u32,
     /// Changes of the program that the grain does not see.
     pub unseen: Vec<UnseenChange>,
     /// The limit that kept the search from trying everything at this grain.
@@ -43,6 +45,7 @@ impl ExplorationScope {
         ExplorationScope {
             grain: settings.grain,
             timers: settings.timers,
+            aborts: settings.aborts,
             unseen: unseen_changes(program, settings.grain),
             limit: found.limit,
             states: found.states,
@@ -88,6 +91,10 @@ impl fmt::Display for ExplorationScope {
             |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
         let (grain, timers) = (self.grain.name(), self.timers.name());
         let (states, runs) = (counted(self.states, "state"), counted(self.runs, "run"));
-        write!(f, "grain {grain}, timers {timers}; {states}, {runs}")
+        write!(f, "grain {grain}, timers {timers}")?;
+        if self.aborts > 0 {
+            write!(f, ", aborts {}", self.aborts)?;
+        }
+        write!(f, "; {states}, {runs}")
     }
 }

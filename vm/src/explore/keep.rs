@@ -115,7 +115,7 @@ impl<'a> Keeper<'a> {
             self.fingerprints.restore(&kept.fingerprints);
             let choices = search.choices_after(before, place);
             self.followed = choices.len();
-            let run = kept.run;
+            let run = kept.run.clone();
             self.base = Some(kept);
             return Ok((machine, run, choices));
         }
@@ -128,7 +128,7 @@ impl<'a> Keeper<'a> {
         explore_by(&mut machine, self.settings);
         self.fingerprints.begin_machine();
         let run = PointRun::begin(&mut machine, self.settings);
-        self.start = self.save(&mut machine, run);
+        self.start = self.save(&mut machine, run.clone());
         let choices = search.choices_after(ROOT, place);
         self.followed = choices.len();
         Ok((machine, run, choices))

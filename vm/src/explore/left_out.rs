@@ -10,9 +10,18 @@
 //! Neither is known at the beginning. A search begins with no such points and variables. A run that comes to
 //! a sudden action, without a point since the last action, shows that the tick after that one is needed; one
 //! that sets a variable beside other tasks shows that it is in a race. Then the search begins again, with
-//! what was shown. The last one has shown nothing, so it has left out only what makes no difference. The same
-//! goes for the points inside of cleanup forms and limits, which matter where requests reach tasks that could
-//! run: then the next search leaves out nothing at all.
+//! what was shown. The last one has shown nothing, so it has left out only what makes no difference.
+//!
+//! A task that has begun or was woken goes on first, alone, up to its first point: others see nothing of
+//! that. If its way begins with a sudden action, the place where it stood is a point.
+//!
+//! A request to end or to leave a form, and an interrupt, depend on the place where they find a task, inside
+//! of cleanup forms and limits, and where there are guards. A search notes the kinds of tasks that requests
+//! reach, and the places at which tasks stop before they make them. Then a task of such a kind stops at each
+//! of these ticks, but only those go on there that stand at such a place; all others might as well have gone
+//! before the task began its way. So such a task has to have stopped after its last action, and does not go
+//! first, alone. What an account of several tasks ends depends on all their ticks: then the next search
+//! leaves out nothing.
 //!
 //! Source: Lipton 1975 for actions that commute; Musuvathi and Qadeer 2007 for looking for races in the runs
 //! of a search that relies on their absence.
@@ -25,10 +34,12 @@ use super::Settings;
 use super::digest::Digest;
 use crate::fused::unfused;
 use crate::interp::frames::Frames;
+use crate::interp::start::first_code_of;
 use crate::names::load::image_origin;
 use crate::task::TaskIndex;
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::event;
 
 /// A place of the program at which a tick lies: a word of a code. Functions with the same code share their
 /// places, which costs states.
@@ -47,6 +58,25 @@ impl TickPlace {
     }
 }
 
+/// A kind of tasks: those that have begun with the same code, and have the same name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct TaskKind(u64);
+
+impl TaskKind {
+    /// Returns the kind of a task.
+    fn of(vm: &Vm, index: TaskIndex, codes: &mut CodeDigests) -> TaskKind {
+        let Some(task) = vm.scheduler.tasks.at(index) else { return TaskKind(0) };
+        let mut digest = Digest::default();
+        digest.add(codes.of_code(vm, first_code_of(task)));
+        let name = vm.heap.slot_or_nil(task.object, event::NAME);
+        if let Some(symbol) = vm.names.name_of(&vm.heap, name) {
+            let Digest(one, other) = Digest::of_symbol(&symbol);
+            digest.add(one ^ other);
+        }
+        TaskKind(digest.0)
+    }
+}
+
 /// Digests of the codes of the program's functions, by their addresses in the course of a run: the next run
 /// may have other codes there. Those of the library have numbers.
 #[derive(Debug, Default)]
@@ -58,17 +88,21 @@ pub(super) struct CodeDigests {
 
 impl CodeDigests {
     fn of(&mut self, vm: &Vm, function: Value) -> u64 {
-        let mut digest = Digest::default();
         if let Some((image, number)) = image_origin(&vm.heap, function) {
+            let mut digest = Digest::default();
             digest.add_all([image as u64, u64::from(number)].into_iter());
             return digest.0;
         }
-        let Some(code) = vm.heap.function_code(function) else { return 0 };
+        vm.heap.function_code(function).map_or(0, |code| self.of_code(vm, code))
+    }
+
+    fn of_code(&mut self, vm: &Vm, code: Value) -> u64 {
         if self.cycle != vm.heap.cycle_id() {
             self.cycle = vm.heap.cycle_id();
             self.known.clear();
         }
         *self.known.entry(code.bits()).or_insert_with(|| {
+            let mut digest = Digest::default();
             let words = unfused(vm.heap.code_words(code).unwrap_or_default());
             digest.add_all(words.into_iter().map(u64::from));
             digest.0
@@ -79,20 +113,39 @@ impl CodeDigests {
 /// The points that the searches so far have shown to be needed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NeededPoints {
-    /// Ticks after actions.
+    /// Ticks after actions, and places at which tasks begin or are woken.
     pub(super) places: HashSet<TickPlace>,
     /// Variables in a race.
     pub(super) variables: HashSet<Symbol>,
+    /// Places at which tasks stop before they make requests.
+    requests: HashSet<TickPlace>,
+    /// Kinds of tasks that requests reach.
+    reached: HashSet<TaskKind>,
+    /// Kinds of tasks that requests reach while they could run.
+    targets: HashSet<TaskKind>,
+    /// Whether timers that fire while tasks could run make requests.
+    timers: bool,
+}
+
+impl NeededPoints {
+    /// Returns whether requests reach tasks.
+    pub(super) fn has_targets(&self) -> bool {
+        !self.targets.is_empty()
+    }
 }
 
 /// The points that runs have shown to be needed beyond these.
 #[derive(Debug, Default)]
 pub(super) struct ShownPoints {
-    /// Whether all are needed: a request to end or to leave a form, or an interrupt, has reached a task that
-    /// could run, or a variable in a race has no name.
+    /// Whether all are needed: an account of several tasks was spent while one of them could run, or a
+    /// variable in a race has no name.
     pub(super) needs_all: bool,
     pub(super) places: Vec<TickPlace>,
     pub(super) variables: Vec<Symbol>,
+    requests: Vec<TickPlace>,
+    reached: Vec<TaskKind>,
+    targets: Vec<TaskKind>,
+    timers: bool,
 }
 
 impl ShownPoints {
@@ -101,11 +154,17 @@ impl ShownPoints {
         self.needs_all |= other.needs_all;
         self.places.extend(other.places);
         self.variables.extend(other.variables);
+        self.requests.extend(other.requests);
+        self.reached.extend(other.reached);
+        self.targets.extend(other.targets);
+        self.timers |= other.timers;
     }
 
     /// Returns whether nothing was shown.
     pub(super) fn is_nothing(&self) -> bool {
-        !self.needs_all && self.places.is_empty() && self.variables.is_empty()
+        let has_requests = !(self.requests.is_empty() && self.reached.is_empty() && self.targets.is_empty());
+        let is_empty = self.places.is_empty() && !has_requests;
+        is_empty && self.variables.is_empty() && !self.needs_all && !self.timers
     }
 }
 
@@ -121,6 +180,54 @@ impl<'a> LeftOut<'a> {
     /// Creates the notes of a run, in a search that knows what is needed.
     pub(super) fn new(needed: &'a NeededPoints) -> LeftOut<'a> {
         LeftOut { needed, shown: ShownPoints::default(), codes: CodeDigests::default() }
+    }
+
+    /// Returns the place at which a task stands.
+    pub(super) fn place(&mut self, vm: &Vm, index: TaskIndex) -> TickPlace {
+        TickPlace::of(vm, index, &mut self.codes)
+    }
+
+    /// Returns whether requests reach tasks of the kind of this one.
+    pub(super) fn is_reached(&mut self, vm: &Vm, index: TaskIndex) -> bool {
+        !self.needed.reached.is_empty()
+            && self.needed.reached.contains(&TaskKind::of(vm, index, &mut self.codes))
+    }
+
+    /// Returns whether requests reach tasks of the kind of this one while they could run.
+    pub(super) fn is_target(&mut self, vm: &Vm, index: TaskIndex) -> bool {
+        self.needed.has_targets() && self.needed.targets.contains(&TaskKind::of(vm, index, &mut self.codes))
+    }
+
+    /// Returns whether a task stands where tasks stop before they make requests.
+    pub(super) fn may_request(&mut self, vm: &Vm, index: TaskIndex) -> bool {
+        !self.needed.requests.is_empty() && self.needed.requests.contains(&self.place(vm, index))
+    }
+
+    /// Returns whether timers make requests that fire while tasks could run.
+    pub(super) fn has_timer_requests(&self) -> bool {
+        self.needed.timers
+    }
+
+    /// Takes from the machine which tasks were reached by requests of a task that has stopped at this place
+    /// before; `None` for those of timers.
+    pub(super) fn take_requests(&mut self, vm: &mut Vm, place: Option<TickPlace>) {
+        for (index, could_run) in std::mem::take(&mut vm.scheduler.points.requested) {
+            let kind = TaskKind::of(vm, index, &mut self.codes);
+            if !self.needed.reached.contains(&kind) {
+                self.shown.reached.push(kind);
+            }
+            if !could_run {
+                continue;
+            }
+            if !self.needed.targets.contains(&kind) {
+                self.shown.targets.push(kind);
+            }
+            match place {
+                Some(place) if self.needed.requests.contains(&place) => {}
+                Some(place) => self.shown.requests.push(place),
+                None => self.shown.timers |= !self.needed.timers,
+            }
+        }
     }
 
     /// Takes from the machine which variables it has found to be in a race.
@@ -171,5 +278,9 @@ impl Searches {
         }
         self.needed.places.extend(shown.places);
         self.needed.variables.extend(shown.variables);
+        self.needed.requests.extend(shown.requests);
+        self.needed.reached.extend(shown.reached);
+        self.needed.targets.extend(shown.targets);
+        self.needed.timers |= shown.timers;
     }
 }

@@ -12,6 +12,8 @@
 
 use std::collections::VecDeque;
 
+use super::search::LeftChoices;
+
 /// Rank that stands for time.
 pub(super) const TIME: u8 = 63;
 /// Rank that stands for no task.
@@ -24,17 +26,23 @@ pub(super) struct StateTasks {
     pub(super) able: u64,
     /// Number of ways among which the program chooses; 0 if it does not.
     pub(super) ways: u16,
+    /// Whether tasks may be asked to end, by further choices.
+    pub(super) has_aborts: bool,
     /// Rank of the task that ran last, when the state was reached first.
     pub(super) last: u8,
-    /// Number of points with a choice that were left out between the last choice and the state, then.
-    pub(super) skipped: u32,
+    /// Number of the list of choices at points that were left out before the state, then.
+    pub(super) left: u32,
 }
 
 /// The cause of a step from a state to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StepCause {
-    /// Rank of the task that went on, [`TIME`], or [`NO_TASK`] if that is not known.
-    pub(super) ran: u8,
+    /// Rank of the task that was chosen, [`TIME`], or [`NO_TASK`] if that is not known.
+    pub(super) chosen: u8,
+    /// Rank of the task that ran last on the way.
+    pub(super) last: u8,
+    /// Those that went on, by rank, and whether time passed.
+    pub(super) ran: u64,
     /// The alternative that the program chose.
     pub(super) way: u16,
     /// Whether the same tasks were there afterwards.
@@ -47,8 +55,8 @@ pub(super) struct StateStep {
     pub(super) from: u32,
     pub(super) to: u32,
     pub(super) cause: StepCause,
-    /// Number of points with a choice that were left out on the way.
-    pub(super) skipped: u32,
+    /// Number of the list of choices at points that were left out on the way.
+    pub(super) left: u32,
 }
 
 /// A fair way round: the state at which it begins and ends, and the choices on it.
@@ -61,6 +69,7 @@ pub(super) struct FairLap {
 /// The graph of states.
 pub(super) struct StateGraph<'a> {
     tasks: &'a [StateTasks],
+    left: &'a LeftChoices,
     /// The steps that keep tasks, by the state from which they lead.
     steps: Vec<StateStep>,
     /// Where those from each state begin.
@@ -76,20 +85,19 @@ pub(super) struct StateGraph<'a> {
 impl<'a> StateGraph<'a> {
     /// Creates the graph of these states and steps, without the states of which `is_out` is true.
     pub(super) fn new(
-        tasks: &'a [StateTasks],
-        steps: &[StateStep],
+        (tasks, steps, left): (&'a [StateTasks], &[StateStep], &'a LeftChoices),
         (has_timers, is_fair): (bool, bool),
         is_out: impl Fn(u32) -> bool,
     ) -> StateGraph<'a> {
         let stays = |step: &&StateStep| step.cause.keeps_tasks && !is_out(step.from) && !is_out(step.to);
         let mut kept: Vec<StateStep> = steps.iter().filter(stays).copied().collect();
-        kept.sort_unstable_by_key(|step| (step.from, step.to, step.cause.ran, step.cause.way));
+        kept.sort_unstable_by_key(|step| (step.from, step.to, step.cause.chosen, step.cause.way));
         let mut starts = vec![0; tasks.len() + 1];
         kept.iter().for_each(|step| starts[step.from as usize + 1] += 1);
         for state in 0..tasks.len() {
             starts[state + 1] += starts[state];
         }
-        StateGraph { tasks, steps: kept, starts, has_timers, is_fair, parts: vec![1; tasks.len()] }
+        StateGraph { tasks, left, steps: kept, starts, has_timers, is_fair, parts: vec![1; tasks.len()] }
     }
 
     fn steps_from(&self, state: u32) -> &[StateStep] {
@@ -201,9 +209,8 @@ impl<'a> StateGraph<'a> {
         let able = |state: u32| self.tasks[state as usize].able;
         let always = part.iter().fold(u64::MAX, |all, &state| all & able(state));
         let ever = part.iter().fold(0, |all, &state| all | able(state));
-        let ran = |step: &StateStep| if step.cause.ran <= TIME { 1 << step.cause.ran } else { 0 };
-        let run =
-            part.iter().flat_map(|&state| self.inner_steps(state)).fold(0_u64, |all, step| all | ran(&step));
+        let steps = part.iter().flat_map(|&state| self.inner_steps(state));
+        let run = steps.fold(0, |all, step| all | step.cause.ran);
         if always & !run != 0 {
             return None;
         }
@@ -211,7 +218,8 @@ impl<'a> StateGraph<'a> {
         let mut lap: Vec<StateStep> = Vec::new();
         let mut here = first;
         for rank in (0..64).filter(|rank| ever >> rank & 1 == 1) {
-            let is_done = |step: &StateStep| ran(step) >> rank & 1 == 1 || able(step.to) >> rank & 1 == 0;
+            let is_done =
+                |step: &StateStep| step.cause.ran >> rank & 1 == 1 || able(step.to) >> rank & 1 == 0;
             if !lap.iter().any(is_done) {
                 lap.extend(self.way_to(here, &is_done)?);
                 here = lap.last().map_or(here, |step| step.to);
@@ -254,8 +262,8 @@ impl<'a> StateGraph<'a> {
     fn choices_of(&self, first: u32, steps: &[StateStep]) -> Vec<u32> {
         let mut last = self.tasks[first as usize].last;
         let mut choices = Vec::new();
-        for StateStep { from, cause, skipped, .. } in steps {
-            let StateTasks { able, ways, .. } = self.tasks[*from as usize];
+        for StateStep { from, cause, left, .. } in steps {
+            let StateTasks { able, ways, has_aborts, .. } = self.tasks[*from as usize];
             let tasks = able & !(1 << TIME);
             let count = tasks.count_ones() + u32::from(self.has_timers && able >> TIME == 1);
             let is_able = |rank: u8| rank < TIME && tasks >> rank & 1 == 1;
@@ -263,20 +271,20 @@ impl<'a> StateGraph<'a> {
                 if ways > 1 {
                     choices.push(u32::from(cause.way));
                 }
-            } else if count > 1 {
+            } else if count > 1 || has_aborts {
                 // The task that ran last comes first, then the others by rank, then time.
-                let before = (tasks & ((1 << cause.ran.min(TIME)) - 1)).count_ones();
-                let choice = match cause.ran {
+                let before = (tasks & ((1 << cause.chosen.min(TIME)) - 1)).count_ones();
+                let choice = match cause.chosen {
                     rank if rank == last && is_able(last) => 0,
                     rank if is_able(last) && last > rank => before + 1,
                     _ => before,
                 };
                 choices.push(choice);
             }
-            if cause.ran < TIME {
-                last = cause.ran;
+            if cause.last < TIME {
+                last = cause.last;
             }
-            choices.extend(std::iter::repeat_n(0, *skipped as usize));
+            choices.extend_from_slice(self.left.get(*left));
         }
         choices
     }
@@ -287,19 +295,23 @@ mod tests {
     use super::*;
 
     fn state(able: u64) -> StateTasks {
-        StateTasks { able, ways: 0, last: 0, skipped: 0 }
+        StateTasks { able, ways: 0, has_aborts: false, last: 0, left: 0 }
     }
 
     fn step(from: u32, to: u32, ran: u8) -> StateStep {
-        StateStep { from, to, cause: StepCause { ran, way: 0, keeps_tasks: true }, skipped: 0 }
+        StateStep { from, to, cause: cause(ran, 0), left: 0 }
+    }
+
+    fn cause(chosen: u8, way: u16) -> StepCause {
+        StepCause { chosen, last: chosen, ran: 1 << chosen, way, keeps_tasks: true }
     }
 
     fn lap(tasks: &[StateTasks], steps: &[StateStep]) -> Option<FairLap> {
-        StateGraph::new(tasks, steps, (false, true), |_| false).fair_lap()
+        StateGraph::new((tasks, steps, &LeftChoices::default()), (false, true), |_| false).fair_lap()
     }
 
     fn any_lap(tasks: &[StateTasks], steps: &[StateStep]) -> Option<FairLap> {
-        StateGraph::new(tasks, steps, (false, false), |_| false).fair_lap()
+        StateGraph::new((tasks, steps, &LeftChoices::default()), (false, false), |_| false).fair_lap()
     }
 
     #[test]
@@ -331,10 +343,7 @@ mod tests {
     #[test]
     fn a_choice_that_leads_out_is_made_at_some_time() {
         let asks = StateTasks { ways: 2, ..state(1) };
-        let way = |from, to, way| {
-            let cause = StepCause { ran: 0, way, keeps_tasks: true };
-            StateStep { from, to, cause, skipped: 0 }
-        };
+        let way = |from, to, way| StateStep { from, to, cause: cause(0, way), left: 0 };
         let leaves = [way(0, 1, 0), way(0, 2, 1), step(1, 0, 0)];
         assert_eq!(lap(&[asks, state(1), state(0)], &leaves), None);
         let stays = [way(0, 1, 0), way(0, 1, 1), step(1, 0, 0)];

@@ -37,7 +37,8 @@
 //! some time). The task that has just run comes first, then the others from the oldest to the newest; a
 //! choice is an index into that order, and a list of choices determines a schedule: [`Vm::follow`] runs it
 //! again. Time is virtual, and moves when all tasks wait; with [`TimerGrain::Any`], letting it move to the
-//! first timer is the last choice at each point.
+//! first timer is the last choice at each point. With [`Settings::aborts`], an operator may ask a task to
+//! end: a choice for each task, at each point, also while all tasks wait.
 //!
 //! **Search.** The machine goes back to a point where another choice was possible, takes that one, and
 //! continues until it ends or reaches a known state. Going back means restoring a snapshot of that point;
@@ -164,6 +165,8 @@ pub struct Settings {
     pub counts: bool,
     /// Which schedules without an end count.
     pub fairness: Fairness,
+    /// Most aborts of a schedule by an operator, who may ask any task of the program to end, at any point.
+    pub aborts: u32,
 }
 
 impl Default for Settings {
@@ -183,6 +186,7 @@ impl Default for Settings {
             clock: false,
             counts: false,
             fairness: Fairness::Weak,
+            aborts: 0,
         }
     }
 }

@@ -14,7 +14,9 @@ use crate::heap::Kind;
 use crate::heap::layout::SymbolObject;
 use crate::run::{self, RunOutcome};
 use crate::schedule::{Choices, Due, Grain};
-use crate::task::{Control, EntryKind, TaskIndex, TaskNumber, TaskState};
+use crate::task::{
+    AccountId, Control, EntryKind, Task, TaskId, TaskIndex, TaskNumber, TaskState, UnwindTarget,
+};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -148,7 +150,7 @@ pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
 }
 
 /// A run from point to point: what has to be known of it beside the state of the machine.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct PointRun {
     /// The task that ran last.
     last: TaskNumber,
@@ -162,8 +164,42 @@ pub(super) struct PointRun {
     has_timers: bool,
     /// With [`Grain::Variables`], what is to be known of the way since the last point.
     unseen: Option<UnseenWay>,
-    /// Number of points with a choice that were left out since the last one.
-    skipped: u32,
+    /// The points that were left out since the last one.
+    passed: PassedPoints,
+    /// Whether the task that ran last stands at a tick at which only requests to it matter.
+    awaits_requests: bool,
+    /// Number of tasks that may still be asked to end.
+    aborts: u32,
+    /// Whether the machine stands at the point of the last choice, which has let no task go on.
+    stays: bool,
+    /// The place at which it was when it was chosen.
+    chosen_at: Option<TickPlace>,
+}
+
+/// Points with a choice that were left out.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PassedPoints {
+    /// The choice at each.
+    pub(super) choices: Vec<u32>,
+    /// The tasks that went on there first, when they had begun or were woken.
+    pub(super) tasks: SmallVec<[TaskNumber; 4]>,
+}
+
+impl PassedPoints {
+    fn clear(&mut self) {
+        self.choices.clear();
+        self.tasks.clear();
+    }
+}
+
+/// What to do at a tick.
+enum AtTick {
+    /// Others may go.
+    Stop,
+    /// Those may go that make requests.
+    StopForRequests,
+    /// This task goes on, the one that ran last.
+    GoOn(TaskIndex),
 }
 
 /// Most ticks that are left out one after the other: a task that goes round for ever has to come to a point.
@@ -220,20 +256,28 @@ impl PointRun {
                 last_action: None,
                 outside: (0, 0),
             }),
-            skipped: 0,
+            passed: PassedPoints::default(),
+            awaits_requests: false,
+            aborts: settings.aborts,
+            stays: false,
+            chosen_at: None,
         }
     }
 
-    /// Returns the number of points with a choice that were left out since the last one, at each of which the
-    /// first choice leads here.
-    pub(super) fn skipped(&self) -> u32 {
-        self.skipped
+    /// Returns the points with a choice that were left out since the last one.
+    pub(super) fn passed(&self) -> &PassedPoints {
+        &self.passed
     }
 
     /// Returns the bits of the conditions that are still to become true in the state of a machine.
     pub(super) fn pending(&self, vm: &Vm) -> u64 {
         let bits = vm.heap.symbol(self.pending).and_then(|symbol| symbol.value.as_fixnum());
         bits.and_then(|bits| u64::try_from(bits).ok()).unwrap_or(0)
+    }
+
+    /// Returns the number of tasks that may still be asked to end.
+    pub(super) fn aborts(&self) -> u32 {
+        self.aborts
     }
 
     /// Returns the task that ran last.
@@ -260,6 +304,7 @@ impl PointRun {
             {
                 left_out.shown.places.extend(way.last_action.filter(|_| way.is_sudden(vm)));
             }
+            left_out.take_requests(vm, self.chosen_at);
             left_out.take_variables(vm);
         }
         outcome
@@ -277,16 +322,29 @@ impl PointRun {
                 return Some(RunOutcome::TicksUsed);
             }
             if let Some(turn) = vm.scheduler.open_turn.take() {
+                let index = turn.task.index;
                 run::go_on_with_turn(vm, turn, end);
+                note_tick(vm, index);
                 continue;
             }
             if !std::mem::take(&mut self.is_at_point) {
                 if let Some(outcome) = self.come_to_point(vm) {
                     return Some(outcome);
                 }
-                if let Some(index) = self.goes_on_unseen(vm, left_out.as_deref_mut()) {
-                    run::give_turn(vm, index, end);
-                    continue;
+                match &mut left_out {
+                    Some(left_out) => left_out.take_requests(vm, self.chosen_at),
+                    None => vm.scheduler.points.requested.clear(),
+                }
+                self.awaits_requests = false;
+                let stays = std::mem::take(&mut self.stays);
+                let next = if stays { AtTick::Stop } else { self.look_at_tick(vm, left_out.as_deref_mut()) };
+                match next {
+                    AtTick::Stop => {}
+                    AtTick::StopForRequests => self.awaits_requests = true,
+                    AtTick::GoOn(index) => {
+                        give_turn(vm, index, end);
+                        continue;
+                    }
                 }
             }
             let mut runnable: Vec<(bool, TaskNumber, TaskIndex)> =
@@ -296,43 +354,155 @@ impl PointRun {
                 if vm.scheduler.counts.alive == 0 {
                     return Some(RunOutcome::Done);
                 }
+                let aborts = self.tasks_to_abort(vm);
+                if !aborts.is_empty() {
+                    let here = PointRun { is_at_point: true, ..self.clone() };
+                    let waiting = Runnable {
+                        tasks: &[],
+                        ways: None,
+                        has_last: false,
+                        has_timer: true,
+                        aborts: &aborts,
+                        tried: None,
+                    };
+                    let choice = choose(vm, here, waiting)?;
+                    self.passed.clear();
+                    if let Some(id) = waiting.abort(choice) {
+                        self.abort(vm, id);
+                        continue;
+                    }
+                }
                 if !run::idle(vm) {
                     return Some(RunOutcome::Waiting);
                 }
+                // Where all tasks wait, a request finds them where they wait.
+                vm.scheduler.points.requested.clear();
                 continue;
             };
+            let has_timer = self.has_timers && time_may_pass(vm);
+            if vm.scheduler.points.asked.is_none()
+                && !self.awaits_requests
+                && self.aborts == 0
+                && let Some(left_out) = &mut left_out
+                && let Some(position) = first_alone(vm, &runnable, left_out)
+            {
+                let (_, number, index) = runnable[position];
+                let has_choice = runnable.len() > 1 || has_timer;
+                self.go_first((number, index), has_choice.then_some(position as u32), vm, left_out);
+                give_turn(vm, index, end);
+                continue;
+            }
             let tasks: SmallVec<[TaskIndex; 16]> = runnable.iter().map(|&(.., index)| index).collect();
-            let here = PointRun { is_at_point: true, ..*self };
+            let here = PointRun { is_at_point: true, ..self.clone() };
             if let Some(ways) = vm.scheduler.points.asked {
                 let ways = Some(ways as u32);
-                let asking = Runnable { tasks: &tasks, ways, has_last: false, has_timer: false };
+                let asking = Runnable {
+                    tasks: &tasks,
+                    ways,
+                    has_last: false,
+                    has_timer: false,
+                    aborts: &[],
+                    tried: None,
+                };
                 let way = choose(vm, here, asking)?;
-                self.skipped = 0;
+                self.passed.clear();
                 vm.scheduler.points.asked = None;
                 vm.scheduler.points.chosen = Some(way as usize);
                 if let Some(&(_, _, index)) = runnable.first().filter(|_| !is_other) {
                     if let Some(task) = vm.scheduler.tasks.at_mut(index) {
                         task.flags.set_at_point(false);
                     }
-                    run::give_turn(vm, index, end);
+                    give_turn(vm, index, end);
                 }
                 continue;
             }
-            let has_timer = self.has_timers && time_may_pass(vm);
-            let choice =
-                choose(vm, here, Runnable { tasks: &tasks, ways: None, has_last: !is_other, has_timer })?;
-            self.skipped = 0;
+            let aborts = self.tasks_to_abort(vm);
+            let tried: Option<SmallVec<[u32; 8]>> =
+                left_out.as_deref_mut().filter(|_| self.awaits_requests).map(|left_out| {
+                    let others = (1_u32..).zip(&tasks[1..]);
+                    let may_request = |&(_, &index): &(u32, &TaskIndex)| left_out.may_request(vm, index);
+                    let mut tried: SmallVec<[u32; 8]> =
+                        others.filter(may_request).map(|(choice, _)| choice).collect();
+                    tried.extend((has_timer && left_out.has_timer_requests()).then_some(tasks.len() as u32));
+                    // Of those that may be asked to end, only this one stands elsewhere at the next point.
+                    let own = aborts.iter().position(|id| id.index == tasks[0]);
+                    let before = tasks.len() + usize::from(has_timer);
+                    tried.extend(own.map(|position| (before + position) as u32));
+                    tried
+                });
+            let tried = tried.as_deref();
+            let has_last = !is_other;
+            let choices = Runnable { tasks: &tasks, ways: None, has_last, has_timer, aborts: &aborts, tried };
+            let choice = choose(vm, here, choices)?;
+            self.passed.clear();
+            if let Some(id) = choices.abort(choice) {
+                self.abort(vm, id);
+                continue;
+            }
             if has_timer && choice as usize == tasks.len() {
+                self.stays = true;
                 run::idle(vm);
+                if let Some(left_out) = &mut left_out {
+                    left_out.take_requests(vm, None);
+                }
                 continue;
             }
             let (_, number, index) = runnable[choice as usize % runnable.len()];
+            if number != self.last
+                && let Some(way) = &mut self.unseen
+            {
+                way.last_action = None;
+            }
             self.last = number;
+            self.chosen_at = left_out.as_deref_mut().map(|left_out| left_out.place(vm, index));
             if let Some(task) = vm.scheduler.tasks.at_mut(index) {
                 vm.scheduler.points.is_open = task.flags.at_point();
                 task.flags.set_at_point(false);
             }
-            run::give_turn(vm, index, end);
+            give_turn(vm, index, end);
+        }
+    }
+
+    /// Returns the tasks of the program that may be asked to end, oldest first.
+    fn tasks_to_abort(&self, vm: &Vm) -> Vec<TaskId> {
+        if self.aborts == 0 {
+            return Vec::new();
+        }
+        let tasks = &vm.scheduler.tasks;
+        let asked = tasks.ids().into_iter().filter_map(|id| {
+            let task = tasks.get(id).filter(|task| task.state != TaskState::Ended)?;
+            let is_open =
+                !task.flags.hidden() && !task.flags.kept() && !task.flags.abort_pending() && !ends(task);
+            is_open.then_some((task.number, id))
+        });
+        let mut asked: Vec<(TaskNumber, TaskId)> = asked.collect();
+        asked.sort_unstable_by_key(|&(number, _)| number);
+        asked.into_iter().map(|(_, id)| id).collect()
+    }
+
+    /// Asks a task to end, as an operator does.
+    fn abort(&mut self, vm: &mut Vm, id: TaskId) {
+        self.aborts -= 1;
+        self.stays = true;
+        vm.abort(id);
+        vm.scheduler.points.requested.clear();
+    }
+
+    /// Notes that a task goes first, which has begun or was woken: by this choice, if there is one. Then the
+    /// place where it stands is a point that was left out.
+    fn go_first(
+        &mut self,
+        (number, index): (TaskNumber, TaskIndex),
+        choice: Option<u32>,
+        vm: &Vm,
+        left_out: &mut LeftOut<'_>,
+    ) {
+        let place = left_out.place(vm, index);
+        (self.last, self.chosen_at) = (number, Some(place));
+        self.passed.tasks.push(number);
+        self.passed.choices.extend(choice);
+        if let Some(way) = &mut self.unseen {
+            (way.last_action, way.outside) = (choice.map(|_| place), outside(vm));
         }
     }
 
@@ -344,10 +514,11 @@ impl PointRun {
         points.asked.is_some() && self.unseen.as_ref().is_some_and(is_open)
     }
 
-    /// Returns the task that ran last if it stands at a tick that is not a point: if others have seen nothing
-    /// of it since its last point, giving way here would be as giving way there.
-    fn goes_on_unseen(&mut self, vm: &mut Vm, mut left_out: Option<&mut LeftOut<'_>>) -> Option<TaskIndex> {
-        let way = self.unseen.as_mut()?;
+    /// Returns what to do if the task that ran last stands at a tick: if others have seen nothing of it since
+    /// its last point, giving way here would be as giving way there, but for requests to the task.
+    fn look_at_tick(&mut self, vm: &mut Vm, mut left_out: Option<&mut LeftOut<'_>>) -> AtTick {
+        let aborts = self.tasks_to_abort(vm);
+        let Some(way) = self.unseen.as_mut() else { return AtTick::Stop };
         let symbols = vm.names.symbol_count();
         if way.watched != symbols {
             watch_variables(vm);
@@ -356,7 +527,7 @@ impl PointRun {
         }
         if vm.scheduler.points.asked.is_some() {
             // No other task may go here, so the way of this one goes on.
-            return None;
+            return AtTick::Stop;
         }
         let (last_action, is_sudden) = (way.last_action.take(), way.is_sudden(vm));
         let points = &mut vm.scheduler.points;
@@ -370,35 +541,54 @@ impl PointRun {
             left_out.shown.places.extend(last_action.filter(|_| is_sudden));
         }
         let was_left_out = std::mem::take(&mut way.left_out);
-        if ticks >= way.most {
-            return None;
-        }
-        let (_, index) = runnable_tasks(vm).find(|&(number, _)| number == self.last)?;
-        let task = vm.scheduler.tasks.at(index).filter(|task| !task.flags.at_point())?;
+        let last = runnable_tasks(vm).find(|&(number, _)| number == self.last);
+        let task = last.and_then(|(_, index)| Some((index, vm.scheduler.tasks.at(index)?)));
+        // One that was woken meanwhile goes on as others do.
+        let stands = |task: &Task| task.flags.at_tick() && !task.flags.at_point();
+        let Some((index, task)) = task.filter(|(_, task)| stands(task) && ticks < way.most) else {
+            return AtTick::Stop;
+        };
         // An abort cuts off the rest of the task, of which others may see each part.
         let depends_on_place =
             vm.scheduler.points.has_guards || task.control.get().is_some_and(depends_on_place);
         let may_matter = has_shown || depends_on_place;
         if may_matter && (left_out.is_none() || was_left_out >= MOST_LEFT_OUT) {
-            return None;
+            return AtTick::Stop;
         }
-        match left_out {
-            Some(left_out) if is_seen => {
-                let place = TickPlace::of(vm, index, &mut left_out.codes);
-                if left_out.needed.places.contains(&place) {
-                    return None;
-                }
-                (way.last_action, way.outside) = (Some(place), outside(vm));
+        let mut last_action = last_action;
+        if let Some(left_out) = left_out.as_deref_mut().filter(|_| is_seen) {
+            let place = left_out.place(vm, index);
+            if left_out.needed.places.contains(&place) {
+                return AtTick::Stop;
             }
-            _ => way.last_action = last_action,
+            (last_action, way.outside) = (Some(place), outside(vm));
         }
+        let is_abortable = aborts.iter().any(|id| id.index == index);
+        let has_timer = self.has_timers && time_may_pass(vm);
+        let others: SmallVec<[TaskIndex; 16]> =
+            runnable_tasks(vm).map(|(_, other)| other).filter(|&other| other != index).collect();
+        if let Some(left_out) = left_out
+            && depends_on_place
+            && (is_abortable || left_out.is_target(vm, index))
+        {
+            if last_action.is_some() {
+                // Others may go between that and a request to this task.
+                return AtTick::Stop;
+            }
+            let may_request = others.iter().any(|&other| left_out.may_request(vm, other));
+            if is_abortable || may_request || has_timer && left_out.has_timer_requests() {
+                way.left_out = was_left_out + 1;
+                return AtTick::StopForRequests;
+            }
+        }
+        way.last_action = last_action;
         way.left_out = was_left_out + u32::from(may_matter);
         if !may_matter {
             way.ticks = ticks;
-        } else if runnable_tasks(vm).count() > 1 || self.has_timers && time_may_pass(vm) {
-            self.skipped += 1;
+        } else if !others.is_empty() || has_timer || !aborts.is_empty() {
+            self.passed.choices.push(0);
         }
-        Some(index)
+        AtTick::GoOn(index)
     }
 
     /// Does what is to be done between two turns. Returns how the run has ended, if it has.
@@ -415,6 +605,52 @@ impl PointRun {
             run::deliver_some(vm);
         }
         (!check_state(vm, self.checks)).then_some(RunOutcome::BudgetSpent)
+    }
+}
+
+/// Returns the position of a task that goes first, alone: it has begun or was woken, and others see nothing
+/// of its way to its first point.
+fn first_alone(
+    vm: &Vm,
+    runnable: &[(bool, TaskNumber, TaskIndex)],
+    left_out: &mut LeftOut<'_>,
+) -> Option<usize> {
+    runnable.iter().position(|&(_, _, index)| {
+        let is_new = vm.scheduler.tasks.at(index).is_some_and(|task| {
+            let flags = task.flags;
+            let is_undisturbed = !flags.attention() && task.critical == 0 && task.account == AccountId::NONE;
+            is_undisturbed && !flags.at_point() && !flags.at_tick()
+        });
+        is_new
+            && !left_out.needed.places.contains(&left_out.place(vm, index))
+            && !left_out.is_reached(vm, index)
+    })
+}
+
+/// Returns whether a task is on its way to its end.
+fn ends(task: &Task) -> bool {
+    let unwinding = task.control.get().and_then(|control| control.unwinding.as_ref());
+    unwinding.is_some_and(|unwinding| matches!(unwinding.target, UnwindTarget::Root(_)))
+}
+
+/// Returns the time if a task stands at a tick: there it may hold a time that the library has read, such as
+/// the deadline of a sleep, of which relative times do not tell whether it has passed.
+pub(super) fn time_at_ticks(vm: &Vm) -> u64 {
+    let stands_at_tick = |(_, index)| vm.scheduler.tasks.at(index).is_some_and(|task| task.flags.at_tick());
+    if runnable_tasks(vm).any(stands_at_tick) { vm.scheduler.clock.now } else { 0 }
+}
+
+/// Gives a task a turn, and notes of it whether it then stands at a tick.
+fn give_turn(vm: &mut Vm, index: TaskIndex, end: u64) {
+    run::give_turn(vm, index, end);
+    note_tick(vm, index);
+}
+
+/// Notes of a task that has had a turn whether it stands at a tick: not if it waits, and will be woken.
+fn note_tick(vm: &mut Vm, index: TaskIndex) {
+    if let Some(task) = vm.scheduler.tasks.at_mut(index) {
+        let stands = task.state == TaskState::Runnable && !task.flags.at_point();
+        task.flags.set_at_tick(stands);
     }
 }
 

@@ -123,6 +123,8 @@ impl Vm {
         let mut priorities = Priorities::new(schedule);
         let mut found = RandomRun { outcome: None, choices: Vec::new(), steps: 0, tasks: 0 };
         let mut seen = std::collections::HashSet::new();
+        let numbers = &mut priorities.numbers;
+        let aborts: Vec<u64> = (0..settings.aborts).map(|_| 1 + numbers.below(schedule.steps)).collect();
         let mut run = PointRun::begin(self, settings);
         found.outcome = run.go_on(self, u64::MAX, None, &mut |vm: &mut Vm, _, runnable: Runnable<'_>| {
             found.steps += 1;
@@ -138,6 +140,9 @@ impl Vm {
             }
             let choice = match runnable.ways {
                 Some(ways) => priorities.numbers.below(u64::from(ways)) as u32,
+                None if !runnable.aborts.is_empty() && aborts.contains(&found.steps) => {
+                    alternatives.len() as u32 + priorities.numbers.below(runnable.aborts.len() as u64) as u32
+                }
                 None => priorities.choose(found.steps, &alternatives),
             };
             if runnable.count() > 1 {

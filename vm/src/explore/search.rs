@@ -1,6 +1,7 @@
 //! The state of a search: the tree of choices that were made, those to be made, and the states found.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::livelock::{StateGraph, StateStep, StateTasks};
 use super::set::StateSet;
@@ -12,8 +13,40 @@ pub(super) struct MadeChoice {
     pub(super) choice: u32,
     /// State in which the choice was made.
     pub(super) state: u32,
-    /// Number of points with a choice that were left out since the choice before.
-    pub(super) skipped: u32,
+    /// Number of the list of choices at points that were left out since the choice before.
+    pub(super) left: u32,
+}
+
+/// Lists of choices at points that were left out, by number; the first one is empty.
+pub(super) struct LeftChoices {
+    lists: Vec<Arc<[u32]>>,
+    numbers: HashMap<Arc<[u32]>, u32>,
+}
+
+impl Default for LeftChoices {
+    fn default() -> LeftChoices {
+        let none: Arc<[u32]> = Arc::default();
+        LeftChoices { lists: vec![none.clone()], numbers: HashMap::from([(none, 0)]) }
+    }
+}
+
+impl LeftChoices {
+    /// Returns the list with this number.
+    pub(super) fn get(&self, number: u32) -> &[u32] {
+        &self.lists[number as usize]
+    }
+
+    /// Returns the number of a list.
+    pub(super) fn number(&mut self, choices: &[u32]) -> u32 {
+        if let Some(&number) = self.numbers.get(choices) {
+            return number;
+        }
+        let number = self.lists.len() as u32;
+        let list: Arc<[u32]> = choices.into();
+        self.lists.push(list.clone());
+        self.numbers.insert(list, number);
+        number
+    }
 }
 
 /// A node in the tree of choices: its last choice, after those of its parent.
@@ -44,6 +77,8 @@ pub(super) struct Search {
     pub(super) tasks: Vec<StateTasks>,
     /// The bits of the conditions that are still to become true in each state; states behind have none.
     pending: Vec<u64>,
+    /// Choices at points that were left out.
+    pub(super) left: LeftChoices,
     /// Steps between states.
     pub(super) steps: Vec<StateStep>,
     /// States from which a step leads to the end.
@@ -147,17 +182,15 @@ impl Search {
     /// Returns the choices that lead to a node, with those at points that were left out.
     pub(super) fn choices(&self, node: u32) -> Vec<u32> {
         let made = self.made_after(ROOT, node);
-        let with_skipped = |made: MadeChoice| {
-            std::iter::repeat_n(0, made.skipped as usize).chain(std::iter::once(made.choice))
-        };
-        made.into_iter().flat_map(with_skipped).collect()
+        let with_left = |made: &MadeChoice| [self.left.get(made.left), &[made.choice]].concat();
+        made.iter().flat_map(with_left).collect()
     }
 
     /// Returns the choices that lead to a state on the way by which it was reached first, up to the state
     /// itself.
     pub(super) fn choices_to_state(&self, state: u32) -> Vec<u32> {
         let mut choices = self.choices(self.places[state as usize]);
-        choices.extend(std::iter::repeat_n(0, self.tasks[state as usize].skipped as usize));
+        choices.extend_from_slice(self.left.get(self.tasks[state as usize].left));
         choices
     }
 
@@ -197,7 +230,8 @@ impl Search {
     /// which `is_out` is false.
     fn lap(&self, settings: &Settings, is_out: impl Fn(u32) -> bool) -> Option<Livelock> {
         let (has_timers, is_fair) = (settings.timers == TimerGrain::Any, settings.fairness == Fairness::Weak);
-        let lap = StateGraph::new(&self.tasks, &self.steps, (has_timers, is_fair), is_out).fair_lap()?;
+        let states = (&*self.tasks, &*self.steps, &self.left);
+        let lap = StateGraph::new(states, (has_timers, is_fair), is_out).fair_lap()?;
         let before = self.choices_to_state(lap.state);
         Some(Livelock { lap: before.len(), choices: [before, lap.choices].concat() })
     }

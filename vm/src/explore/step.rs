@@ -10,7 +10,7 @@ use crate::interp::frames::Frames;
 use crate::names::class;
 use crate::report::{program_place, task_label};
 use crate::schedule::{SharedUse, UsedPlace};
-use crate::task::{Task, TaskIndex};
+use crate::task::{Task, TaskId, TaskIndex};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -23,14 +23,25 @@ pub(super) struct Runnable<'a> {
     pub(super) ways: Option<u32>,
     /// Whether the first of the tasks is the one that ran last.
     pub(super) has_last: bool,
-    /// Whether, as the last choice, time may pass up to the first timer.
+    /// Whether, as the next choice, time may pass up to the first timer.
     pub(super) has_timer: bool,
+    /// The tasks that may be asked to end, by the choices after these.
+    pub(super) aborts: &'a [TaskId],
+    /// The choices beside the first that a search has to try; `None` for all.
+    pub(super) tried: Option<&'a [u32]>,
 }
 
 impl Runnable<'_> {
     /// Returns the number of choices.
     pub(super) fn count(&self) -> u32 {
-        self.ways.unwrap_or(self.tasks.len() as u32 + u32::from(self.has_timer))
+        let others = u32::from(self.has_timer) + self.aborts.len() as u32;
+        self.ways.unwrap_or(self.tasks.len() as u32 + others)
+    }
+
+    /// Returns the task that this choice asks to end.
+    pub(super) fn abort(&self, choice: u32) -> Option<TaskId> {
+        let before = self.tasks.len() + usize::from(self.has_timer);
+        self.aborts.get((choice as usize).checked_sub(before)?).copied()
     }
 }
 
@@ -50,6 +61,11 @@ pub enum Switch {
         oldest: StandingTask,
         /// The task that went on.
         next: StandingTask,
+    },
+    /// An operator has asked a task to end.
+    Abort {
+        /// The task.
+        task: StandingTask,
     },
     /// Time has passed, up to the first timer, before a task went on.
     Timer {
@@ -218,7 +234,10 @@ pub(super) fn is_of_library(symbol: &Symbol) -> bool {
 
 /// Describes a choice that is not the first.
 pub(super) fn switch(vm: &mut Vm, runnable: Runnable<'_>, choice: u32) -> Switch {
-    let first = StandingTask::of(vm, runnable.tasks[0]);
+    if let Some(id) = runnable.abort(choice) {
+        return Switch::Abort { task: StandingTask::of(vm, id.index) };
+    }
+    let first = StandingTask::of(vm, runnable.tasks.first().copied().unwrap_or(TaskIndex::NONE));
     if runnable.ways.is_some() {
         return Switch::Choice { task: first, form: choice };
     }

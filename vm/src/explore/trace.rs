@@ -6,24 +6,34 @@ use super::Subject;
 use super::keep::Keeper;
 use super::left_out::{LeftOut, NeededPoints, ShownPoints};
 use super::livelock::{NO_TASK, StateStep, StateTasks, StepCause, TIME};
-use super::point::{PointRun, living_tasks};
+use super::point::{PassedPoints, PointRun, living_tasks, time_at_ticks};
 use super::search::{MadeChoice, ROOT, Search};
 use super::step::Runnable;
 use super::worker::{ClaimedStep, Claims, RunPlace};
-use super::{SearchLimit, Settings};
+use super::{Grain, SearchLimit, Settings};
 use crate::task::TaskNumber;
 use crate::vm::Vm;
 
+/// An odd number that spreads a time over a fingerprint.
+const TIME_FACTOR: u128 = 0x9E37_79B9_7F4A_7C15_D6E8_FEB8_6659_FD93;
+
+/// Another one, for the number of aborts.
+const ABORTS_FACTOR: u128 = 0xC2B2_AE3D_27D4_EB4F_1656_67B1_9E37_79F9;
+
 /// Bytes that a step of a run takes until the search has taken it in, about.
-const STEP_BYTES: usize = 80;
+const STEP_BYTES: usize = 176;
 
 /// A state that a run has come to.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct TraceStep {
     /// Its fingerprint.
     pub(super) state: u128,
     /// Number of choices there.
     pub(super) count: u32,
+    /// The choices beside the first that are to be tried; `None` for all.
+    pub(super) tried: Option<SmallVec<[u32; 4]>>,
+    /// Choices at points that were left out on the way.
+    pub(super) left: Vec<u32>,
     /// Whether the first of them lets the task go on that ran last.
     pub(super) has_last: bool,
     /// Whether the program itself chooses.
@@ -45,10 +55,14 @@ struct TasksAtPoint {
     /// Whether the choice was to let time pass.
     passes_time: bool,
     choice: u32,
+    /// The task that was chosen.
+    chosen: TaskNumber,
+    /// Whether a task was asked to end.
+    is_abort: bool,
 }
 
 impl TasksAtPoint {
-    fn of(vm: &mut Vm, run: PointRun, runnable: Runnable<'_>) -> (TasksAtPoint, StateTasks) {
+    fn of(vm: &mut Vm, run: &PointRun, runnable: Runnable<'_>) -> (TasksAtPoint, StateTasks) {
         let (numbers, mut able) = living_tasks(vm);
         if vm.scheduler.first_timer().is_some() {
             able |= 1 << TIME;
@@ -56,22 +70,44 @@ impl TasksAtPoint {
         let last = rank(&numbers, run.last());
         let ways = runnable.ways.map_or(0, |ways| u16::try_from(ways).unwrap_or(u16::MAX));
         let has_ways = runnable.ways.is_some();
-        let tasks = StateTasks { able, ways, last, skipped: run.skipped() };
-        (TasksAtPoint { numbers, has_ways, passes_time: false, choice: 0 }, tasks)
+        let has_aborts = !runnable.aborts.is_empty();
+        let tasks = StateTasks { able, ways, has_aborts, last, left: 0 };
+        let mut here = TasksAtPoint {
+            numbers,
+            has_ways,
+            passes_time: false,
+            choice: 0,
+            chosen: run.last(),
+            is_abort: false,
+        };
+        here.choose(vm, runnable, 0);
+        (here, tasks)
     }
 
     /// Notes the choice that is made here.
-    fn choose(&mut self, runnable: Runnable<'_>, choice: u32) {
-        let is_last = choice as usize == runnable.tasks.len();
-        (self.passes_time, self.choice) = (!self.has_ways && runnable.has_timer && is_last, choice);
+    fn choose(&mut self, vm: &Vm, runnable: Runnable<'_>, choice: u32) {
+        let is_timer = choice as usize == runnable.tasks.len();
+        (self.passes_time, self.choice) = (!self.has_ways && runnable.has_timer && is_timer, choice);
+        let chosen = if self.has_ways { runnable.tasks.first() } else { runnable.tasks.get(choice as usize) };
+        let task = chosen.and_then(|&index| vm.scheduler.tasks.at(index));
+        self.chosen = task.map_or(TaskNumber::NONE, |task| task.number);
+        self.is_abort = !self.has_ways && runnable.abort(choice).is_some();
     }
 
-    /// Returns what has led from here to another point, at which these tasks are, after this one has run.
-    fn cause(&self, numbers: &[TaskNumber], ran: TaskNumber) -> StepCause {
+    /// Returns what has led from here to another point, at which these tasks are: this one has run last, and
+    /// points were left out.
+    fn cause(&self, numbers: &[TaskNumber], last: TaskNumber, passed: &PassedPoints) -> StepCause {
+        let rank_of = |task| rank(&self.numbers, task);
+        let chosen = if self.passes_time { TIME } else { rank_of(self.chosen) };
+        let bit = |rank: u8| if rank <= TIME { 1_u64 << rank } else { 0 };
+        let others = passed.tasks.iter().fold(0, |all, &task| all | bit(rank_of(task)));
         StepCause {
-            ran: if self.passes_time { TIME } else { rank(&self.numbers, ran) },
+            chosen,
+            last: rank_of(last),
+            ran: bit(chosen) | others,
             way: if self.has_ways { u16::try_from(self.choice).unwrap_or(u16::MAX) } else { 0 },
-            keeps_tasks: self.numbers[..] == *numbers && numbers.len() <= usize::from(TIME),
+            // There are only so many aborts, so none is on a cycle.
+            keeps_tasks: !self.is_abort && self.numbers[..] == *numbers && numbers.len() <= usize::from(TIME),
         }
     }
 }
@@ -154,17 +190,18 @@ impl<'a, S: Subject> Tracer<'a, S> {
         let mut end = TraceEnd::Known;
         let mut before: Option<TasksAtPoint> = None;
         let most = settings.states.min(settings.memory / STEP_BYTES);
-        let mut left_out = settings.reduce.then(|| LeftOut::new(needed));
+        let leaves_out = settings.reduce && settings.grain == Grain::Variables;
+        let mut left_out = leaves_out.then(|| LeftOut::new(needed));
         let outcome = run.go_on(&mut machine, u64::MAX, left_out.as_mut(), &mut |vm, run, runnable| {
             if given.len() == 1 && runnable.count() > 1 {
-                keeper.keep_on_the_way(vm, run, search, parent);
+                keeper.keep_on_the_way(vm, run.clone(), search, parent);
             }
             if runnable.count() > 1
                 && let Some(choice) = given.next()
             {
                 if given.len() == 0 {
-                    let (mut here, _) = TasksAtPoint::of(vm, run, runnable);
-                    here.choose(runnable, choice);
+                    let (mut here, _) = TasksAtPoint::of(vm, &run, runnable);
+                    here.choose(vm, runnable, choice);
                     before = Some(here);
                 }
                 return Some(choice);
@@ -172,14 +209,25 @@ impl<'a, S: Subject> Tracer<'a, S> {
             if given.len() > 0 {
                 return Some(0);
             }
-            let state = keeper.fingerprints.of(vm) ^ u128::from(run.has_open_action(vm));
-            let (count, has_last) = (runnable.count(), runnable.has_last);
-            let (here, tasks) = TasksAtPoint::of(vm, run, runnable);
-            let unknown = StepCause { ran: NO_TASK, way: 0, keeps_tasks: false };
-            let cause = before.as_ref().map_or(unknown, |before| before.cause(&here.numbers, run.last()));
+            let mut state = keeper.fingerprints.of(vm) ^ u128::from(run.has_open_action(vm));
+            if settings.aborts > 0 {
+                state ^= u128::from(run.aborts()).wrapping_mul(ABORTS_FACTOR);
+            }
+            if needed.has_targets() || settings.aborts > 0 {
+                state ^= u128::from(time_at_ticks(vm)).wrapping_mul(TIME_FACTOR);
+            }
+            // A task that went first has done nothing yet: others that go before it do not stop it.
+            let has_last = runnable.has_last && !run.passed().tasks.contains(&run.last());
+            let count = runnable.count();
+            let (here, tasks) = TasksAtPoint::of(vm, &run, runnable);
+            let unknown = StepCause { chosen: NO_TASK, last: NO_TASK, ran: 0, way: 0, keeps_tasks: false };
+            let cause = before
+                .as_ref()
+                .map_or(unknown, |before| before.cause(&here.numbers, run.last(), run.passed()));
             before = Some(here);
             let (has_ways, pending) = (runnable.ways.is_some(), run.pending(vm));
-            steps.push(TraceStep { state, count, has_last, has_ways, tasks, pending, cause });
+            let (tried, left) = (runnable.tried.map(SmallVec::from_slice), run.passed().choices.clone());
+            steps.push(TraceStep { state, count, tried, left, has_last, has_ways, tasks, pending, cause });
             end = if search.states.contains(state) {
                 TraceEnd::Known
             } else if let Some(step) = claims.claim((state, run.last()), (number, steps.len() - 1)) {
@@ -215,12 +263,12 @@ pub(super) struct Merging<'a> {
 }
 
 /// Where a run is taken in: the choices so far, and the state in which the last step began.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct MergePlace {
     pub(super) node: u32,
     pub(super) before: Option<u32>,
-    /// Number of points that were left out since the last choice.
-    pub(super) skipped: u32,
+    /// Choices at points that were left out since the last choice.
+    pub(super) left: Vec<u32>,
 }
 
 /// The outcome of merging the steps of a run.
@@ -243,12 +291,12 @@ impl Merging<'_> {
         (serial, steps, first): (u64, &[TraceStep], usize),
     ) -> Merged {
         for (step, at) in steps.iter().zip(0..).skip(first) {
-            let skipped = step.tasks.skipped;
-            place.skipped += skipped;
-            let tasks = StateTasks { skipped: place.skipped, ..step.tasks };
+            let left = search.left.number(&step.left);
+            place.left.extend_from_slice(&step.left);
+            let tasks = StateTasks { left: search.left.number(&place.left), ..step.tasks };
             let (state, is_new) = search.state(step.state, place.node, tasks);
             if let Some(from) = place.before {
-                search.steps.push(StateStep { from, to: state, cause: step.cause, skipped });
+                search.steps.push(StateStep { from, to: state, cause: step.cause, left });
             }
             if !is_new {
                 return Merged::Known;
@@ -264,33 +312,33 @@ impl Merging<'_> {
                 return Merged::Over;
             }
             if step.count > 1 {
-                self.open(search, *step, place, (serial, at));
+                self.open(search, step, place, (serial, at));
             }
         }
         Merged::New
     }
 
     /// Opens the other choices of a state.
-    fn open(&mut self, search: &mut Search, step: TraceStep, place: &mut MergePlace, at: (u64, usize)) {
+    fn open(&mut self, search: &mut Search, step: &TraceStep, place: &mut MergePlace, at: (u64, usize)) {
         // A preemption is a switch at which the task that has just run could have continued.
         let switches = self.switches + usize::from(step.has_last);
         let before = search.nodes[place.node as usize].faults;
         let faults = before + u32::from(step.has_ways);
-        let state = place.before.unwrap_or_default();
+        let (state, left) = (place.before.unwrap_or_default(), search.left.number(&place.left));
         if self.settings.switches.is_some_and(|most| switches > most) {
             *self.limit = self.limit.or(Some(SearchLimit::Switches));
         } else if self.settings.faults.is_some_and(|most| faults as usize > most) {
             *self.limit = self.limit.or(Some(SearchLimit::Faults));
         } else {
             for choice in (1..step.count).rev() {
-                let choice = MadeChoice { choice, state, skipped: place.skipped };
-                search.open(switches, (place.node, choice, faults));
+                if step.tried.as_ref().is_none_or(|tried| tried.contains(&choice)) {
+                    search.open(switches, (place.node, MadeChoice { choice, state, left }, faults));
+                }
             }
         }
         search.placed.insert(at, place.node);
-        let choice = MadeChoice { choice: 0, state, skipped: place.skipped };
-        place.node = search.node((place.node, choice, before));
-        place.skipped = 0;
+        place.node = search.node((place.node, MadeChoice { choice: 0, state, left }, before));
+        place.left.clear();
     }
 }
 
@@ -298,6 +346,6 @@ impl MergePlace {
     /// Returns where a run from a node is taken in.
     pub(super) fn of(search: &Search, node: u32) -> MergePlace {
         let before = (node != ROOT).then(|| search.nodes[node as usize].made.state);
-        MergePlace { node, before, skipped: 0 }
+        MergePlace { node, before, left: Vec::new() }
     }
 }

@@ -5,7 +5,7 @@
 use super::wake::call_attention;
 use crate::raise::Exit;
 use crate::schedule::{AccountOwner, Amount, Due, Measure};
-use crate::task::{AccountId, EntryKind, Limit, LimitNumber, TaskIndex};
+use crate::task::{AccountId, EntryKind, Limit, LimitNumber, TaskIndex, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -100,8 +100,17 @@ pub(crate) fn go_on(vm: &mut Vm) {
 /// Charges ticks or bytes to an account and those above it; limits whose accounts are spent by it expire.
 pub(super) fn charge_account(vm: &mut Vm, id: AccountId, measure: Measure, units: u64) {
     for (index, number) in vm.scheduler.accounts.charge(id, measure, units) {
-        expire(vm, index, number, vm.names.known.budget_exhausted);
+        expire_spent(vm, index, number);
     }
+}
+
+/// Notes that a limit has expired whose account is spent.
+fn expire_spent(vm: &mut Vm, index: TaskIndex, number: LimitNumber) {
+    let can_run =
+        |vm: &Vm| vm.scheduler.tasks.at(index).is_some_and(|task| task.state == TaskState::Runnable);
+    let was_hit = vm.scheduler.points.grain.is_some() && can_run(vm);
+    vm.scheduler.points.was_hit |= was_hit;
+    expire(vm, index, number, vm.names.known.budget_exhausted);
 }
 
 /// Sees to it that the running task may take a unit more of a measure.
@@ -121,7 +130,7 @@ pub(crate) fn admit(vm: &mut Vm, measure: Measure) -> Result<(), Exit> {
 fn admit_to(vm: &mut Vm, account: AccountId, measure: Measure) -> Result<(), Exit> {
     let Err(expired) = vm.scheduler.accounts.admit(account, measure) else { return Ok(()) };
     for (index, number) in expired {
-        expire(vm, index, number, vm.names.known.budget_exhausted);
+        expire_spent(vm, index, number);
     }
     Err(Exit::Again)
 }

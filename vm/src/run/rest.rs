@@ -67,6 +67,8 @@ pub(crate) fn begin_rest(vm: &mut Vm, tasks: &[TaskIndex], stops_clock: bool, no
     let by = vm.scheduler.task().object;
     vm.scheduler.tasks.make_standstills(&mut vm.heap);
     for &index in tasks {
+        // It could have come before the task waits.
+        vm.scheduler.points.note_request(index, false);
         let Some((rest, standstill)) = vm.scheduler.tasks.rest_mut(index) else { continue };
         standstill.times = standstill.times.saturating_add(1);
         if *rest != Rest::None {

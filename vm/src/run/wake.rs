@@ -23,8 +23,7 @@ pub(super) fn call_attention(vm: &mut Vm, index: TaskIndex) {
     let Some(task) = vm.scheduler.tasks.at_mut(index) else { return };
     if task.state != TaskState::Ended {
         task.flags.set_attention(true);
-        let points = &mut vm.scheduler.points;
-        points.was_hit |= points.grain.is_some() && task.state == TaskState::Runnable;
+        vm.scheduler.points.note_request(index, task.state == TaskState::Runnable);
         make_runnable(vm, index, true);
     }
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::{Scheduler, TurnEnd};
 use crate::raise::Exit;
-use crate::task::{TaskEnd, TaskNumber, UnwindTarget, Unwinding};
+use crate::task::{TaskEnd, TaskIndex, TaskNumber, UnwindTarget, Unwinding};
 use crate::value::Value;
 
 /// Kinds of operations before which a task stands at a point.
@@ -96,8 +96,11 @@ pub(crate) struct Points {
     pub(crate) found_raced: Vec<Value>,
     /// Whether time may pass while tasks can run.
     pub(crate) is_timed: bool,
-    /// Whether a request to end or to leave a form, or an interrupt, has reached a task that could run.
+    /// Whether an account that tasks share was spent by one while another could run.
     pub(crate) was_hit: bool,
+    /// Other tasks than the running one that were reached by a request to end or to leave a form, or by an
+    /// interrupt, and whether they could run.
+    pub(crate) requested: Vec<(TaskIndex, bool)>,
     /// Whether there are guards, which may interrupt tasks anywhere.
     pub(crate) has_guards: bool,
     /// Number of ways among which the task that ran last wants one to be chosen.
@@ -128,6 +131,14 @@ impl Points {
     fn note_passed(&mut self) {
         if self.grain.is_some() {
             (self.has_shown, self.is_seen) = (true, true);
+        }
+    }
+
+    /// Notes that a request has reached a task that does not run.
+    #[cold]
+    pub(crate) fn note_request(&mut self, task: TaskIndex, could_run: bool) {
+        if self.grain.is_some() && !self.requested.contains(&(task, could_run)) {
+            self.requested.push((task, could_run));
         }
     }
 

@@ -159,6 +159,8 @@ define_flags! {
     lacks_room set_lacks_room = 12;
     /// Since it came to lack room, everything has been collected.
     collected_for set_collected_for = 13;
+    /// It stands at a tick, where its last turn has ended: see `explore`.
+    at_tick set_at_tick = 14;
 }
 
 /// Whether a task's last turn has ended for lack of room, and the collections since.

@@ -55,6 +55,7 @@ pub(crate) fn run_explore(
         states: usize::try_from(options.states).unwrap_or(usize::MAX),
         switches: options.switches,
         faults: options.faults,
+        aborts: options.aborts,
         output: false,
         fairness: match options.fairness {
             FairnessChoice::Weak => explore::Fairness::Weak,

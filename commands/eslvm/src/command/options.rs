@@ -389,6 +389,9 @@ pub(crate) struct ExploreArguments {
     /// Most switches of a schedule: points at which a task that could go on lets another one go first
     #[arg(long, value_name = "N")]
     pub(crate) switches: Option<usize>,
+    /// Most aborts of a schedule by an operator, who may ask any task but the main one to end, at any point
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) aborts: u32,
     /// Which schedules without an end are findings: those that are fair to each task, or all
     #[arg(long, value_enum, default_value = "weak")]
     pub(crate) fairness: FairnessChoice,

@@ -259,7 +259,7 @@ impl CommandExploration<'_> {
         say!(
             "{}",
             json!({
-                "verdict": verdict, "grain": grain, "timers": timers, "unseen": unseen, "states": states,
+                "verdict": verdict, "grain": grain, "timers": timers, "aborts": scope.aborts, "unseen": unseen, "states": states,
                 "runs": runs, "findings": count, "limit": limit, "endless": self.options.is_endless,
                 "fairness": if fairness == Fairness::Weak { "weak" } else { "none" },
                 "seconds": self.started.elapsed().as_secs_f64(),
@@ -417,7 +417,8 @@ fn print_summary(scope: &ExplorationScope, tried: &[ExplorationScope], cycle: Op
         say!("all schedules at grain {} were tried before ({coarser}), but {why}", coarser.grain.name());
     }
     let timers = (scope.timers == TimerGrain::Idle).then_some("timers that end early (--timers any)");
-    let left: Vec<&str> = [timers, cycle].into_iter().flatten().collect();
+    let aborts = (scope.aborts == 0).then_some("aborts by an operator (--aborts)");
+    let left: Vec<&str> = [timers, aborts, cycle].into_iter().flatten().collect();
     if !left.is_empty() {
         say!("not tried: {}", left.join("; "));
     }

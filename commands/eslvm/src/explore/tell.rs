@@ -70,6 +70,10 @@ fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<StepRow> {
             }
             ScheduleEvent::End(_) => continue,
             ScheduleEvent::Switch(switch) => match switch_row(step.time, switch) {
+                // A task that stops before it has done anything only comes later.
+                Some(row) if matches!(switch, Switch::Preemption { .. }) && !rows.iter().any(is_by(&row)) => {
+                    continue;
+                }
                 Some(row) => row,
                 None => continue,
             },
@@ -84,6 +88,11 @@ fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<StepRow> {
         }
     }
     shortened(rows)
+}
+
+/// Returns whether a line is of the same task as another.
+fn is_by(row: &StepRow) -> impl Fn(&StepRow) -> bool + '_ {
+    |other| other.task == row.task
 }
 
 /// Returns the lines without those before other tasks come into play, and not too many.
@@ -119,6 +128,7 @@ fn switch_row(time: u64, switch: &Switch) -> Option<StepRow> {
     let (task, text) = match switch {
         Switch::Preemption { stopped, .. } => (stopped, "has to stop before".to_owned()),
         Switch::Order { .. } => return None,
+        Switch::Abort { task } => (task, "is asked to end by an operator".to_owned()),
         Switch::Timer { passed, .. } => {
             let text = format!("{} s pass, and timers end", seconds(*passed));
             let kind = StepRowKind::Switch(switch.clone());
@@ -242,6 +252,9 @@ fn switch_json(time: f64, switch: &Switch, forms: &mut SourceForms) -> Json {
         Switch::Order { oldest, next } => {
             json!({ "kind": "order", "time": time, "goes-on": task(next), "before": task(oldest) })
         }
+        Switch::Abort { task: aborted } => {
+            json!({ "kind": "abort", "time": time, "ends": task(aborted) })
+        }
         Switch::Timer { task: waiting, passed } => {
             json!({ "kind": "timer", "time": time, "passed": seconds(*passed), "before": task(waiting) })
         }
@@ -266,6 +279,9 @@ pub(super) fn text(switch: &Switch, forms: &mut SourceForms) -> String {
         ),
         Switch::Order { oldest, next } => {
             format!("{} goes on{}\nbefore {} does", next.label, place(next, "at"), oldest.label)
+        }
+        Switch::Abort { task } => {
+            format!("an operator asks {} to end{}", task.label, place(task, "at"))
         }
         Switch::Timer { task, passed } => format!(
             "{} s pass, and timers end,\nbefore {} goes on{}",

@@ -178,7 +178,12 @@ fn timers_may_end_at_any_point() {
     folder.file("hurry.esl", text);
     let (status, output, errors) = run(&folder, &["explore", "hurry.esl"]);
     assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
-    assert!(output.ends_with("\nnot tried: timers that end early (--timers any)\n"), "{output}");
+    assert!(
+        output.ends_with(
+            "\nnot tried: timers that end early (--timers any); aborts by an operator (--aborts)\n"
+        ),
+        "{output}"
+    );
     let (status, output, _) = run(&folder, &["explore", "--timers", "any", "hurry.esl"]);
     assert_eq!(status, Some(1), "{output}");
     assert!(output.starts_with("finding 1: a failure leaves the main task\n"), "{output}");

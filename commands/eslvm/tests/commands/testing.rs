@@ -294,7 +294,11 @@ fn options_that_a_test_does_not_have_are_refused() {
             ":explore (:grain fine)",
             "needs a grain behind :EXPLORE, one of CHANGES, READS, VARIABLES, TICKS, not FINE",
         ),
-        (":explore (:grian ticks)", "explores by :GRAIN, :TIMERS, :STATES and :STRICT, not by :GRIAN"),
+        (
+            ":explore (:grian ticks)",
+            "explores by :GRAIN, :TIMERS, :STATES, :STRICT and :ABORTS, not by :GRIAN",
+        ),
+        (":explore (:aborts -1)", "needs a number of :ABORTS, not -1"),
         (":explore (:timers 3)", "needs a way of timers behind :EXPLORE, one of IDLE, ANY, not 3"),
         (":explore (:states 0)", "needs a positive number of :STATES, not 0"),
         (":explore ticks", "needs T or a list such as (:GRAIN TICKS) behind :EXPLORE, not TICKS"),

@@ -120,6 +120,8 @@ const SEEN: &[SharedKind] = &[
             "(sleep #)",
             "(push (with-timeout 1 (sleep #) 'slept) *seen-#*)",
             "(setq *late* (one-more *late*))",
+            "(progn (sleep 1) (setq *late* (one-more *late*)))",
+            "(progn (sleep 1) (push *late* *seen-#*))",
         ],
         contents: "*late*",
     },

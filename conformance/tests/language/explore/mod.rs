@@ -1,5 +1,6 @@
 //! Explores all schedules of small programs: proves what never happens, and finds what does.
 
+mod aborts;
 mod composition;
 mod corpus;
 mod defects;

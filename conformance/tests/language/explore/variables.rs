@@ -126,3 +126,12 @@ fn documentation_and_functions_that_a_program_changes_belong_to_a_state() {
         &["CHANGED", "KEPT"],
     );
 }
+
+#[test]
+fn tasks_that_are_woken_at_the_same_time_go_in_any_order() {
+    for wait in ["(sleep 2)", "(with-recovery-procedures ((:timeout nil)) (with-timeout 2 (sleep 3)))"] {
+        let late = "(spawn (sleep 2) (setq *reply* 'here))";
+        let text = format!("(defvar *reply* nil) {late} {wait} (print *reply*)");
+        check(&text, Grain::Variables, &["HERE", "NIL"]);
+    }
+}
