@@ -79,13 +79,11 @@ fn process(folder: &Path, snapshots: SnapshotEvery, orders: &[i64]) -> Vec<Strin
             std::thread::yield_now();
         }
         // Each order but the last one tells of itself once.
-        while order < 3 {
+        let mut is_done = order == 3;
+        while !is_done {
             let text = heard.recv().expect("the run goes on");
-            let is_of_order = !text.starts_with("open") && !text.starts_with("enter");
+            is_done = !text.starts_with("open") && !text.starts_with("enter");
             all.push(text);
-            if is_of_order {
-                break;
-            }
         }
     }
     if !orders.contains(&3) {

@@ -19,8 +19,8 @@ pub enum CallEffect {
     /// It may not be made twice.
     #[default]
     Once,
-    /// Its effect lasts until one of its objects is closed, as that of a server or a subscription does: the next
-    /// process of a durable run makes it again.
+    /// Its effect lasts until one of its objects is closed, as that of a server or a subscription does: the
+    /// next process of a durable run makes it again.
     Lasts,
 }
 

@@ -114,8 +114,8 @@ impl HostRow {
         self
     }
 
-    /// Notes that the effect of a call lasts until one of its objects is closed, be it an argument or a value:
-    /// the next process of a durable run makes the call again.
+    /// Notes that the effect of a call lasts until one of its objects is closed, be it an argument or a
+    /// value: the next process of a durable run makes the call again.
     pub fn lasts(&mut self) -> &mut HostRow {
         self.effect = CallEffect::Lasts;
         self

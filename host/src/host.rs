@@ -308,8 +308,8 @@ pub trait Host {
         self.inbox().take()
     }
 
-    /// Returns a call of an earlier process that is to be made again now, after each [`Host::poll`] until none
-    /// is left. The answer goes to [`Host::answer_repeated`]; that of an operation comes by the inbox.
+    /// Returns a call of an earlier process that is to be made again now, after each [`Host::poll`] until
+    /// none is left. The answer goes to [`Host::answer_repeated`]; that of an operation comes by the inbox.
     fn next_repeated(&mut self) -> Option<RepeatedCall> {
         None
     }

@@ -200,8 +200,8 @@ impl Inbox {
         }
     }
 
-    /// Gives the questions from here on numbers above `last`: those up to it belong to earlier processes of the
-    /// run.
+    /// Gives the questions from here on numbers above `last`: those up to it belong to earlier processes of
+    /// the run.
     #[doc(hidden)]
     pub fn number_questions_above(&self, last: u64) {
         let mut open = self.asking().waiting();

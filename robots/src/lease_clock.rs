@@ -1,8 +1,8 @@
 //! The clock by which the leases of a fleet end.
 //!
-//! Guarantees: it goes as fast as that of the store of leases, also while the machine sleeps. The
-//! clock of the program may differ: it may be fast, slow, told by a simulator, or stand still while a durable run
-//! has no process. Setting the system's clock does not move it within a process; in the next process of a
+//! Guarantees: it goes as fast as that of the store of leases, also while the machine sleeps. The clock of
+//! the program may differ: it may be fast, slow, told by a simulator, or stand still while a durable run has
+//! no process. Setting the system's clock does not move it within a process; in the next process of a
 //! durable run it has gone on by the system's clock.
 
 use std::sync::LazyLock;

@@ -317,7 +317,7 @@ fn explore_if_small(
     Ok(complete.map(|states| Verdict::PassedAll(format!("explored: complete, {states} states"))))
 }
 
-/// What is said of a condition of `eventually` or `leads-to` that a fair schedule never meets.
+/// Text about a condition of `eventually` or `leads-to` that a fair schedule never meets.
 const NEVER_COMES_TRUE: &str =
     "never comes true on a schedule that goes on for ever, though each task has its turns";
 

@@ -1,7 +1,7 @@
 //! The task of a program that checks its conditions in each state of an exploration (`always`, `eventually`,
 //! `leads-to`), and what it has found.
 
-use super::point::runnable_tasks;
+use super::tasks::runnable_tasks;
 use crate::describe::describe;
 use crate::heap::Kind;
 use crate::run;
@@ -34,7 +34,7 @@ pub(super) fn check_state(vm: &mut Vm, checks: Value) -> bool {
     while !vm.scheduler.deliveries.is_empty() {
         run::deliver_some(vm);
     }
-    // What the conditions read is not part of a schedule.
+    // The reads of the conditions are not part of a schedule.
     let uses = vm.scheduler.points.uses.take();
     let grain = vm.scheduler.points.grain.take();
     let slice = std::mem::replace(&mut vm.config.slice, CHECK_SLICE);

@@ -9,7 +9,8 @@ use std::rc::Rc;
 
 use super::Settings;
 use super::fingerprint::{Fingerprints, MachineMemory};
-use super::point::{PointRun, explore_by};
+use super::follow::explore_by;
+use super::point::PointRun;
 use super::search::{ROOT, Search};
 use crate::snapshot::Snapshot;
 use crate::vm::Vm;

@@ -36,7 +36,7 @@ use crate::fused::unfused;
 use crate::interp::frames::Frames;
 use crate::interp::start::first_code_of;
 use crate::names::load::image_origin;
-use crate::task::TaskIndex;
+use crate::task::{AccountId, TaskIndex, TaskNumber};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -60,12 +60,12 @@ impl TickPlace {
 
 /// A kind of tasks: those that have begun with the same code, and have the same name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct TaskKind(u64);
+pub(super) struct KindOfTask(u64);
 
-impl TaskKind {
+impl KindOfTask {
     /// Returns the kind of a task.
-    fn of(vm: &Vm, index: TaskIndex, codes: &mut CodeDigests) -> TaskKind {
-        let Some(task) = vm.scheduler.tasks.at(index) else { return TaskKind(0) };
+    fn of(vm: &Vm, index: TaskIndex, codes: &mut CodeDigests) -> KindOfTask {
+        let Some(task) = vm.scheduler.tasks.at(index) else { return KindOfTask(0) };
         let mut digest = Digest::default();
         digest.add(codes.of_code(vm, first_code_of(task)));
         let name = vm.heap.slot_or_nil(task.object, event::NAME);
@@ -73,7 +73,7 @@ impl TaskKind {
             let Digest(one, other) = Digest::of_symbol(&symbol);
             digest.add(one ^ other);
         }
-        TaskKind(digest.0)
+        KindOfTask(digest.0)
     }
 }
 
@@ -120,9 +120,9 @@ pub(super) struct NeededPoints {
     /// Places at which tasks stop before they make requests.
     requests: HashSet<TickPlace>,
     /// Kinds of tasks that requests reach.
-    reached: HashSet<TaskKind>,
+    reached: HashSet<KindOfTask>,
     /// Kinds of tasks that requests reach while they could run.
-    targets: HashSet<TaskKind>,
+    targets: HashSet<KindOfTask>,
     /// Whether timers that fire while tasks could run make requests.
     timers: bool,
 }
@@ -143,8 +143,8 @@ pub(super) struct ShownPoints {
     pub(super) places: Vec<TickPlace>,
     pub(super) variables: Vec<Symbol>,
     requests: Vec<TickPlace>,
-    reached: Vec<TaskKind>,
-    targets: Vec<TaskKind>,
+    reached: Vec<KindOfTask>,
+    targets: Vec<KindOfTask>,
     timers: bool,
 }
 
@@ -190,12 +190,12 @@ impl<'a> LeftOut<'a> {
     /// Returns whether requests reach tasks of the kind of this one.
     pub(super) fn is_reached(&mut self, vm: &Vm, index: TaskIndex) -> bool {
         !self.needed.reached.is_empty()
-            && self.needed.reached.contains(&TaskKind::of(vm, index, &mut self.codes))
+            && self.needed.reached.contains(&KindOfTask::of(vm, index, &mut self.codes))
     }
 
     /// Returns whether requests reach tasks of the kind of this one while they could run.
     pub(super) fn is_target(&mut self, vm: &Vm, index: TaskIndex) -> bool {
-        self.needed.has_targets() && self.needed.targets.contains(&TaskKind::of(vm, index, &mut self.codes))
+        self.needed.has_targets() && self.needed.targets.contains(&KindOfTask::of(vm, index, &mut self.codes))
     }
 
     /// Returns whether a task stands where tasks stop before they make requests.
@@ -212,7 +212,7 @@ impl<'a> LeftOut<'a> {
     /// before; `None` for those of timers.
     pub(super) fn take_requests(&mut self, vm: &mut Vm, place: Option<TickPlace>) {
         for (index, could_run) in std::mem::take(&mut vm.scheduler.points.requested) {
-            let kind = TaskKind::of(vm, index, &mut self.codes);
+            let kind = KindOfTask::of(vm, index, &mut self.codes);
             if !self.needed.reached.contains(&kind) {
                 self.shown.reached.push(kind);
             }
@@ -283,4 +283,23 @@ impl Searches {
         self.needed.targets.extend(shown.targets);
         self.needed.timers |= shown.timers;
     }
+}
+
+/// Returns the position of a task that goes first, alone: it has begun or was woken, and others see nothing
+/// of its way to its first point.
+pub(super) fn first_alone(
+    vm: &Vm,
+    runnable: &[(bool, TaskNumber, TaskIndex)],
+    left_out: &mut LeftOut<'_>,
+) -> Option<usize> {
+    runnable.iter().position(|&(_, _, index)| {
+        let is_new = vm.scheduler.tasks.at(index).is_some_and(|task| {
+            let flags = task.flags;
+            let is_undisturbed = !flags.attention() && task.critical == 0 && task.account == AccountId::NONE;
+            is_undisturbed && !flags.at_point() && !flags.at_tick()
+        });
+        is_new
+            && !left_out.needed.places.contains(&left_out.place(vm, index))
+            && !left_out.is_reached(vm, index)
+    })
 }

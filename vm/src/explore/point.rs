@@ -5,149 +5,15 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::check::check_state;
-use super::left_out::{LeftOut, TickPlace};
-use super::step::{
-    Runnable, ScheduleEvent, ScheduleStep, TellStep, is_of_library, switch, tell_step, tell_uses,
-};
+use super::left_out::{LeftOut, TickPlace, first_alone};
+use super::step::Runnable;
+use super::tasks::{depends_on_place, ends, runnable_tasks, time_may_pass, watch_variables};
 use super::{Settings, TimerGrain};
-use crate::heap::Kind;
-use crate::heap::layout::SymbolObject;
 use crate::run::{self, RunOutcome};
-use crate::schedule::{Choices, Due, Grain};
-use crate::task::{
-    AccountId, Control, EntryKind, Task, TaskId, TaskIndex, TaskNumber, TaskState, UnwindTarget,
-};
+use crate::schedule::Grain;
+use crate::task::{Task, TaskId, TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
-
-/// A run by a list of choices, which may be given its ticks in portions.
-#[derive(Clone, Debug)]
-pub struct FollowedRun {
-    run: PointRun,
-    choices: Vec<u32>,
-    /// Number of choices made so far.
-    made: usize,
-}
-
-impl Vm {
-    /// Prepares to run the program as [`Vm::follow`] does, by [`Vm::go_on_following`].
-    pub fn begin_to_follow(&mut self, settings: &Settings, choices: Vec<u32>) -> FollowedRun {
-        explore_by(self, settings);
-        FollowedRun { run: PointRun::begin(self, settings), choices, made: 0 }
-    }
-
-    /// Runs on along the list of choices, for at most so many ticks.
-    pub fn go_on_following(&mut self, followed: &mut FollowedRun, ticks: u64) -> RunOutcome {
-        let end = self.scheduler.spent.saturating_add(ticks);
-        let FollowedRun { run, choices, made } = followed;
-        let outcome = run.go_on(self, end, None, &mut |_, _, runnable| {
-            if runnable.count() <= 1 {
-                return Some(0);
-            }
-            let choice = choices.get(*made).copied().unwrap_or(0);
-            *made += 1;
-            Some(choice)
-        });
-        let outcome = outcome.unwrap_or(RunOutcome::Done);
-        if outcome != RunOutcome::TicksUsed {
-            self.end_following();
-        }
-        outcome
-    }
-
-    /// Makes tasks stop at points no longer.
-    pub fn end_following(&mut self) {
-        self.scheduler.points.grain = None;
-        self.scheduler.points.is_strict = false;
-    }
-
-    /// Runs the program from point to point along a list of choices found by [`super::explore`] with the same
-    /// settings; beyond the end of the list, the first choice is taken.
-    pub fn follow(&mut self, settings: &Settings, choices: &[u32]) -> RunOutcome {
-        follow(self, settings, choices, true, None).unwrap_or(RunOutcome::Done)
-    }
-
-    /// As [`Vm::follow`]; `told` is told of the choices other than the first, and of the uses of variables.
-    pub fn follow_and_tell(
-        &mut self,
-        settings: &Settings,
-        choices: &[u32],
-        told: &mut TellStep<'_>,
-    ) -> RunOutcome {
-        follow(self, settings, choices, true, Some(told)).unwrap_or(RunOutcome::Done)
-    }
-
-    /// As [`Vm::follow_and_tell`], no further than the last of the choices: for a schedule that does not end.
-    pub fn follow_to(&mut self, settings: &Settings, choices: &[u32], told: &mut TellStep<'_>) {
-        follow(self, settings, choices, false, Some(told));
-    }
-}
-
-/// Runs along choices, and further if `goes_beyond`; returns how the run has ended, if it has.
-fn follow(
-    vm: &mut Vm,
-    settings: &Settings,
-    choices: &[u32],
-    goes_beyond: bool,
-    mut told: Option<&mut TellStep<'_>>,
-) -> Option<RunOutcome> {
-    explore_by(vm, settings);
-    vm.scheduler.points.uses = told.is_some().then(Vec::new);
-    vm.scheduler.points.objects.clear();
-    let mut choices = choices.iter().copied();
-    let mut watched = 0;
-    let mut next = |vm: &mut Vm, runnable: Runnable<'_>| {
-        if let Some(told) = &mut told {
-            tell_uses(vm, *told);
-            // Uses of variables are told at each grain.
-            if watched != vm.names.symbol_count() {
-                watch_variables(vm);
-                watched = vm.names.symbol_count();
-            }
-        }
-        if !goes_beyond && choices.len() == 0 {
-            return None;
-        }
-        let choice = if runnable.count() > 1 { choices.next().unwrap_or(0) } else { 0 };
-        if choice > 0
-            && let Some(told) = &mut told
-        {
-            let event = ScheduleEvent::Switch(switch(vm, runnable, choice));
-            told(ScheduleStep { time: vm.scheduler.clock.now, event });
-        }
-        if let (None, Some(&index), Some(told)) =
-            (runnable.ways, runnable.tasks.get(choice as usize), &mut told)
-        {
-            tell_step(vm, index, *told);
-        }
-        Some(choice)
-    };
-    let mut run = PointRun::begin(vm, settings);
-    let outcome = run.go_on(vm, u64::MAX, None, &mut |vm, _, runnable| next(vm, runnable));
-    if let Some(told) = told {
-        tell_uses(vm, told);
-    }
-    vm.scheduler.points.uses = None;
-    vm.end_following();
-    outcome
-}
-
-/// Makes tasks stop at points from now on.
-pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
-    vm.scheduler.points.grain = Some(settings.grain);
-    vm.scheduler.points.is_strict = settings.strict;
-    vm.scheduler.points.is_timed = settings.timers == TimerGrain::Any;
-    // At a tick a task may hold a time that the library has read, such as the deadline of a sleep; relative
-    // times do not tell whether that has passed.
-    vm.scheduler.points.has_counts = settings.counts;
-    vm.scheduler.points.has_clock = settings.clock || settings.grain == Grain::Ticks;
-    vm.config.slice = match settings.grain {
-        Grain::Changes | Grain::Reads => settings.turn,
-        Grain::Variables | Grain::Ticks => 1,
-    };
-    vm.scheduler.choices = Choices::first();
-    vm.outside.console.note_all(settings.output);
-}
 
 /// A run from point to point: what has to be known of it beside the state of the machine.
 #[derive(Clone, Debug)]
@@ -192,7 +58,7 @@ impl PassedPoints {
     }
 }
 
-/// What to do at a tick.
+/// The way in which a run goes on at a tick.
 enum AtTick {
     /// Others may go.
     Stop,
@@ -608,38 +474,6 @@ impl PointRun {
     }
 }
 
-/// Returns the position of a task that goes first, alone: it has begun or was woken, and others see nothing
-/// of its way to its first point.
-fn first_alone(
-    vm: &Vm,
-    runnable: &[(bool, TaskNumber, TaskIndex)],
-    left_out: &mut LeftOut<'_>,
-) -> Option<usize> {
-    runnable.iter().position(|&(_, _, index)| {
-        let is_new = vm.scheduler.tasks.at(index).is_some_and(|task| {
-            let flags = task.flags;
-            let is_undisturbed = !flags.attention() && task.critical == 0 && task.account == AccountId::NONE;
-            is_undisturbed && !flags.at_point() && !flags.at_tick()
-        });
-        is_new
-            && !left_out.needed.places.contains(&left_out.place(vm, index))
-            && !left_out.is_reached(vm, index)
-    })
-}
-
-/// Returns whether a task is on its way to its end.
-fn ends(task: &Task) -> bool {
-    let unwinding = task.control.get().and_then(|control| control.unwinding.as_ref());
-    unwinding.is_some_and(|unwinding| matches!(unwinding.target, UnwindTarget::Root(_)))
-}
-
-/// Returns the time if a task stands at a tick: there it may hold a time that the library has read, such as
-/// the deadline of a sleep, of which relative times do not tell whether it has passed.
-pub(super) fn time_at_ticks(vm: &Vm) -> u64 {
-    let stands_at_tick = |(_, index)| vm.scheduler.tasks.at(index).is_some_and(|task| task.flags.at_tick());
-    if runnable_tasks(vm).any(stands_at_tick) { vm.scheduler.clock.now } else { 0 }
-}
-
 /// Gives a task a turn, and notes of it whether it then stands at a tick.
 fn give_turn(vm: &mut Vm, index: TaskIndex, end: u64) {
     run::give_turn(vm, index, end);
@@ -652,60 +486,4 @@ fn note_tick(vm: &mut Vm, index: TaskIndex) {
         let stands = task.state == TaskState::Runnable && !task.flags.at_point();
         task.flags.set_at_tick(stands);
     }
-}
-
-/// Makes all uses of the program's special variables known. Those of the library are its own business: it
-/// protects them.
-fn watch_variables(vm: &mut Vm) {
-    let mut watched = Vec::new();
-    vm.names.each_symbol(&mut |symbol, object| {
-        if !is_of_library(symbol)
-            && vm.heap.symbol(object).is_some_and(|cell| cell.header.flags & NOT_WATCHED == 0)
-        {
-            watched.push(object);
-        }
-    });
-    for object in watched {
-        let flags = vm.heap.symbol(object).map_or(0, |cell| cell.header.flags);
-        vm.heap.set_flags(object, Kind::Symbol, flags | SymbolObject::EVER_BOUND);
-    }
-}
-
-/// Flags of symbols that have no variable, or one whose uses are known already.
-const NOT_WATCHED: u8 = SymbolObject::CONSTANT | SymbolObject::EVER_BOUND;
-
-/// Returns whether it makes a difference at which place a task is asked to end, or to leave a form: a cleanup
-/// runs then, or the form is followed by others, which may use variables of the task.
-fn depends_on_place(control: &Control) -> bool {
-    let depends = |kind| {
-        matches!(kind, EntryKind::Cleanup | EntryKind::Running | EntryKind::Limit | EntryKind::Interrupt)
-    };
-    control.entries.iter().any(|entry| depends(entry.kind))
-}
-
-/// Returns whether time may pass while tasks can run. A cleanup takes no longer than it may: otherwise each
-/// that waits would be found to be cut off somewhere.
-fn time_may_pass(vm: &mut Vm) -> bool {
-    vm.scheduler.first_timer().is_some()
-        && vm.scheduler.timers.first().is_some_and(|timer| timer.due != Due::Cleanup)
-}
-
-/// Returns the numbers and places of the tasks that can run.
-pub(super) fn runnable_tasks(vm: &Vm) -> impl Iterator<Item = (TaskNumber, TaskIndex)> + '_ {
-    let ids = vm.scheduler.tasks.ids().into_iter();
-    ids.filter_map(|id| {
-        let task = vm.scheduler.tasks.get(id).filter(|task| task.state == TaskState::Runnable)?;
-        Some((task.number, id.index))
-    })
-}
-
-/// Returns the numbers of the tasks that have not ended, oldest first, and which of the first 63 can run.
-pub(super) fn living_tasks(vm: &Vm) -> (SmallVec<[TaskNumber; 16]>, u64) {
-    let living = vm.scheduler.tasks.iter().filter(|task| task.state != TaskState::Ended);
-    let mut tasks: SmallVec<[(TaskNumber, bool); 16]> =
-        living.map(|task| (task.number, task.state == TaskState::Runnable)).collect();
-    tasks.sort_unstable();
-    let able = tasks.iter().take(63).enumerate().filter(|(_, (_, is_able))| *is_able);
-    let able = able.fold(0, |able, (rank, _)| able | 1 << rank);
-    (tasks.into_iter().map(|(number, _)| number).collect(), able)
 }

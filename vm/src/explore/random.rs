@@ -14,7 +14,8 @@
 use std::collections::HashMap;
 
 use super::Settings;
-use super::point::{PointRun, explore_by};
+use super::follow::explore_by;
+use super::point::PointRun;
 use super::step::Runnable;
 use crate::run::RunOutcome;
 use crate::task::TaskNumber;

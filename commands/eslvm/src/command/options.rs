@@ -395,8 +395,8 @@ pub(crate) struct ExploreArguments {
     /// Which schedules without an end are findings: those that are fair to each task, or all
     #[arg(long, value_enum, default_value = "weak")]
     pub(crate) fairness: FairnessChoice,
-    /// The program is meant to go on for ever: of schedules without an end, only those are findings on which a
-    /// condition of EVENTUALLY or LEADS-TO never comes true
+    /// The program is meant to go on for ever: of schedules without an end, only those are findings on which
+    /// a condition of EVENTUALLY or LEADS-TO never comes true
     #[arg(long, conflicts_with = "random")]
     pub(crate) endless: bool,
     /// Also look for updates that are safe only because no call stands between a read and a write: fragile

@@ -36,7 +36,7 @@ pub struct ExplorationOptions {
     pub jobs: usize,
     /// Time after which the search gives up.
     pub time: Duration,
-    /// Whether the program is meant to go on for ever: then a schedule without an end is no finding by itself.
+    /// Whether the program is meant to go on for ever: then a schedule may go on without an end.
     pub is_endless: bool,
     /// File for a timeline of the first finding.
     pub timeline: Option<PathBuf>,

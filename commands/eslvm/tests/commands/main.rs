@@ -26,6 +26,7 @@ mod durable_upgrades;
 mod endings;
 mod examples;
 mod exploring;
+mod exploring_endless;
 #[cfg(unix)]
 mod fleet;
 mod http;
