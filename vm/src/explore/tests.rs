@@ -7,7 +7,7 @@ use esl_bytecode::builtin::Builtin;
 use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
-use esl_bytecode::symbol::Symbol;
+use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
 
 use super::fingerprint::Fingerprints;
 use super::live::Live;
@@ -17,6 +17,11 @@ use crate::run::RunOutcome;
 use crate::schedule::Choices;
 use crate::value::Value;
 use crate::vm::Vm;
+
+/// Returns the symbol `F` of the program, whose uses are known to a search.
+fn variable() -> Symbol {
+    Symbol::new(&USER_PACKAGE.into(), "F")
+}
 
 fn words(code: &[Instr]) -> Vec<u32> {
     code.iter()
@@ -36,7 +41,7 @@ fn machine(tasks: &[&[Instr]]) -> Vm {
         let function =
             ModuleFunction { registers: 8, constants: vec![PoolIdx(0)], code, ..ModuleFunction::default() };
         let module = Module {
-            constants: vec![Constant::Symbol(Symbol::esl("F"))],
+            constants: vec![Constant::Symbol(variable())],
             functions: vec![function],
             toplevel: vec![FunctionNumber(0)],
             ..Module::default()
@@ -61,7 +66,7 @@ fn call(builtin: Builtin, count: u8) -> Instr {
 fn endings(tasks: &[&[Instr]], settings: &Settings) -> Exploration<(RunOutcome, String)> {
     let begin = || Ok::<Vm, Infallible>(machine(tasks));
     let judge = |vm: &mut Vm, outcome| {
-        let symbol = vm.names.find(&Symbol::esl("F")).unwrap_or(Value::NIL);
+        let symbol = vm.names.find(&variable()).unwrap_or(Value::NIL);
         let value = vm.symbol_value(symbol).map_or("unbound".into(), |value| vm.describe(value));
         (outcome, value)
     };
@@ -99,7 +104,7 @@ fn all_orders_are_found() {
     for ending in &found.endings {
         let mut vm = machine(&[&first, &second]);
         assert_eq!(vm.follow(&Settings::default(), &ending.choices), RunOutcome::Done);
-        let symbol = vm.names.find(&Symbol::esl("F")).unwrap();
+        let symbol = vm.names.find(&variable()).unwrap();
         assert_eq!(vm.describe(vm.symbol_value(symbol).unwrap()), ending.what.1);
     }
 }
@@ -132,7 +137,7 @@ fn a_fingerprint_depends_on_the_state_alone() {
     let mut fingerprints = Fingerprints::default();
     let mut of = |prepare: &dyn Fn(&mut Vm, Value)| {
         let mut vm = machine(&[&[Instr::ReturnValues { first: Items(0), count: Count(0) }]]);
-        let symbol = vm.names.find(&Symbol::esl("F")).unwrap();
+        let symbol = vm.names.find(&variable()).unwrap();
         prepare(&mut vm, symbol);
         fingerprints.begin_machine();
         fingerprints.of(&mut vm)
