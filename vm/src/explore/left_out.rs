@@ -20,8 +20,8 @@
 //! reach, and the places at which tasks stop before they make them. Then a task of such a kind stops at each
 //! of these ticks, but only those go on there that stand at such a place; all others might as well have gone
 //! before the task began its way. So such a task has to have stopped after its last action, and does not go
-//! first, alone. What an account of several tasks ends depends on all their ticks: then the next search
-//! leaves out nothing.
+//! first, alone. The place where an account of several tasks ends them depends on all their ticks: then the
+//! next search leaves out nothing.
 //!
 //! Source: Lipton 1975 for actions that commute; Musuvathi and Qadeer 2007 for looking for races in the runs
 //! of a search that relies on their absence.
