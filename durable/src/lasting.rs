@@ -19,6 +19,8 @@ use super::control::DurableControl;
 
 /// The numbers of operations that are begun again are above this one.
 const REPEATED: u64 = 1 << 62;
+/// Calls from which on the list is searched for those that are over.
+const SOME: usize = 64;
 /// Pauses before a call that has failed is tried again: the first, and the longest.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
 
@@ -76,13 +78,17 @@ impl LastingCall {
         })
     }
 
-    /// Returns the texts of its arguments that are data; `None` in the place of an object.
-    fn data(&self) -> Vec<Option<String>> {
-        let data = self.arguments.iter().map(|argument| match argument {
-            LastingArgument::Data(datum) => Some(datum.to_string()),
-            LastingArgument::Thing(_) => None,
-        });
-        data.collect()
+    /// Returns whether both are calls of one function with equal arguments.
+    fn is_equal(&self, other: &LastingCall) -> bool {
+        use LastingArgument::{Data, Thing};
+        let is_equal = |pair: (&LastingArgument, &LastingArgument)| match pair {
+            (Thing(one), Thing(two)) => one.identity() == two.identity(),
+            (Data(one), Data(two)) => one.to_string() == two.to_string(),
+            _ => false,
+        };
+        self.name == other.name
+            && self.arguments.len() == other.arguments.len()
+            && self.arguments.iter().zip(&other.arguments).all(is_equal)
     }
 
     fn things(&self) -> impl Iterator<Item = &HeldThing> {
@@ -294,7 +300,7 @@ impl LastingCalls {
                     let (name, cause) = (&waiting.call.name, &failure.cause);
                     let reason: Vec<String> = failure.arguments.iter().map(Datum::to_string).collect();
                     control.warn(&format!(
-                        "{name} of an earlier process cannot be repeated: {cause} {}; it is tried again",
+                        "a call of {name} from an earlier process has failed in this one: {cause} {}; it is tried again",
                         reason.join(" ")
                     ));
                 }
@@ -346,12 +352,17 @@ impl LastingCalls {
 }
 
 impl LastingState {
-    /// Adds a call that lasts. One without objects, such as a definition, is made again once.
+    /// Adds a call that lasts. If it makes no object, it takes the place of an equal one before it, so a program
+    /// that repeats a definition or a setting does not make the list longer.
     fn add(&mut self, call: LastingCall) {
-        let is_same = |known: &LastingCall| known.name == call.name && known.data() == call.data();
-        if call.things().next().is_some() || !self.calls.iter().any(is_same) {
-            self.calls.push(call);
+        if call.values.iter().all(Option::is_none) {
+            self.calls.retain(|known| !known.is_equal(&call));
         }
+        // Now and then, those of objects that the program has let go of are left out.
+        if self.calls.len() >= SOME && self.calls.len().is_power_of_two() {
+            self.calls.retain(LastingCall::is_held);
+        }
+        self.calls.push(call);
     }
 
     /// Forgets the calls of objects that are closed.

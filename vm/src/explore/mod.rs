@@ -165,7 +165,7 @@ pub struct Settings {
     pub clock: bool,
     /// Whether states also differ by how often each event was signalled, because the program counts signals.
     pub counts: bool,
-    /// Which schedules without an end count.
+    /// The schedules without an end that count.
     pub fairness: Fairness,
     /// Most aborts of a schedule by an operator, who may ask any task of the program to end, at any point.
     pub aborts: u32,

@@ -241,7 +241,7 @@ impl PointRun {
                 if !run::idle(vm) {
                     return Some(RunOutcome::Waiting);
                 }
-                // Where all tasks wait, a request finds them where they wait.
+                // All tasks wait, so a request finds each at its wait.
                 vm.scheduler.points.requested.clear();
                 continue;
             };

@@ -392,7 +392,7 @@ pub(crate) struct ExploreArguments {
     /// Most aborts of a schedule by an operator, who may ask any task but the main one to end, at any point
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) aborts: u32,
-    /// Which schedules without an end are findings: those that are fair to each task, or all
+    /// Schedules without an end that are findings: those that are fair to each task, or all
     #[arg(long, value_enum, default_value = "weak")]
     pub(crate) fairness: FairnessChoice,
     /// The program is meant to go on for ever: of schedules without an end, only those are findings on which

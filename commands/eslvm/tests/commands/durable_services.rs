@@ -51,7 +51,7 @@ fn a_server_listens_again_in_the_next_process() {
     let mut child = agent.command(&[]).spawn().expect("the command is there");
     let lines = BufReader::new(child.stderr.take().expect("it is a pipe")).lines();
     let mut lines = lines.map_while(Result::ok);
-    let refused = "%HTTP-LISTEN of an earlier process cannot be repeated: NOT-PERMITTED";
+    let refused = "a call of %HTTP-LISTEN from an earlier process has failed in this one: NOT-PERMITTED";
     assert!(lines.any(|line| line.contains(refused)));
     drop(child.kill());
     drop(child.wait());
@@ -103,7 +103,7 @@ fn a_client_of_a_broker_connects_and_subscribes_again() {
     drop(broker);
     let mut child = agent.command(&["--allow-net"]).spawn().expect("the command is there");
     let mut lines = BufReader::new(child.stderr.take().expect("it is a pipe")).lines().map_while(Result::ok);
-    let refused = "%MQTT-OPEN of an earlier process cannot be repeated: CONNECTION-REFUSED";
+    let refused = "a call of %MQTT-OPEN from an earlier process has failed in this one: CONNECTION-REFUSED";
     assert!(lines.any(|line| line.contains(refused)));
     let _broker = start_broker_at(&folder, port);
     publish("100");

@@ -81,7 +81,7 @@ fn a_fair_cycle_without_what_has_to_come_is_found() {
     assert_eq!(unmet, [""; 0]);
     let (unmet, _) = explored(&server, Fairness::None);
     assert_eq!(unmet, ["ASKED", "SERVED"]);
-    // Where the server waits for another one, it need not get its turn.
+    // A server that waits for another one need not get its turn.
     let (unmet, _) =
         explored(&turns("(server (loop (if (= *turn* 0) (setq *turn* 2) (sleep 0))))"), Fairness::Weak);
     assert_eq!(unmet, ["SERVED"]);
