@@ -352,8 +352,8 @@ impl LastingCalls {
 }
 
 impl LastingState {
-    /// Adds a call that lasts. If it makes no object, it takes the place of an equal one before it, so a program
-    /// that repeats a definition or a setting does not make the list longer.
+    /// Adds a call that lasts. If it makes no object, it takes the place of an equal one before it: the list
+    /// does not grow with a program that repeats a definition or a setting.
     fn add(&mut self, call: LastingCall) {
         if call.values.iter().all(Option::is_none) {
             self.calls.retain(|known| !known.is_equal(&call));

@@ -171,7 +171,6 @@ for line in sys.stdin:
         subscriptions.append(ROS2Subscriber(
             "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", node_name="tools", router_port=port,
             callback=tell_statuses))
-        say("watching")
     elif words[0] == "state":
         # The library has no services with empty requests.
         for reply in SESSION.session.get(

@@ -25,8 +25,10 @@ const TIMED: &str = "(defun seconds () (list (round (now)) (round (time:unix))))
     (loop (say (list :event (wait-for-event (ros:node-events node))))))
   (say (list :parameter (ros:parameter node \"use_sim_time\") (seconds)))
   (sleep 2)
-  (say (list :slept (seconds)))
-  (handler-case (wait-for-event (make-event 'never) :timeout 5)
+  ;; The time of the timeout begins before the line that the test waits for.
+  (handler-case (with-timeout 5
+                  (say (list :slept (seconds)))
+                  (wait-for-event (make-event 'never)))
     (failure (failure) (say (list (failure-cause failure) (seconds)))))
   (let ((turns 0))
     (do-every 1
@@ -171,7 +173,7 @@ fn a_node_is_managed_watched_and_followed_by_tools_in_python() {
         // Statuses come in between, each half second.
         while peer.until(|line| !line.starts_with("status ")) != answer {}
     };
-    ask(&mut peer, "watch", "watching");
+    peer.tell("watch");
     peer.until(|line| line == "log 30 executive battery low volts=11.5");
     peer.until(|line| line == "status 1 executive: battery | low");
     peer.until(|line| line == "status 0 executive: lifecycle | unconfigured");
