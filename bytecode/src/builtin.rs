@@ -1157,6 +1157,10 @@ macro_rules! for_each_builtin {
             /// The values of the latest report of an operation on its progress, a list.
             OperationProgress = operation::operation_progress, internal "%OPERATION-PROGRESS" ("handle")
                 shares points;
+            /// Notes a report, a list of values, on the progress of an operation that a task performs, and
+            /// signals the handle, if the operation is under way.
+            NoteOperationProgress = operation::note_operation_progress, internal "%NOTE-OPERATION-PROGRESS"
+                ("handle values") shares points;
             /// The number of an operation.
             OperationNumber = operation::operation_number, internal "%OPERATION-NUMBER" ("handle")
                 shares nothing;

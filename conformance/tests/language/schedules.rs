@@ -20,8 +20,12 @@ use esl::program::{self, Program, Source};
 use esl_conformance::{Expectations, programs};
 use esl_vm::schedule::Choices;
 
-/// Seeds for each slice; 0 is plain round-robin.
-const SEEDS: u64 = 100;
+/// Seeds for each slice; 0 is plain round-robin. `ESL_SEEDS` sets another number of them, for longer runs by
+/// hand.
+fn seeds() -> u64 {
+    std::env::var("ESL_SEEDS").ok().and_then(|count| count.parse().ok()).unwrap_or(25)
+}
+
 const SLICES: [u32; 4] = [1, 7, 100, 2000];
 
 /// The result of a run: the lines that it wrote, its status, and the choices that led there.
@@ -76,7 +80,7 @@ fn check_programs(folder: &str) {
         let expected = Expectations::parse(&text).expect("its comments are well-formed");
         let program = compile(&name, &text);
         'schedules: for slice in SLICES {
-            for seed in 0..SEEDS {
+            for seed in 0..seeds() {
                 let run = run(&program, Choices::seeded(seed), slice);
                 if run.lines != expected.output || run.status != expected.expected_status() {
                     failures.push(format!(

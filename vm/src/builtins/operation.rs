@@ -165,6 +165,18 @@ pub(super) fn operation_progress(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.slot_or_nil(handle, handle::PROGRESS))
 }
 
+pub(super) fn note_operation_progress(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.scheduler.point()?;
+    let [handle, values] = exactly(arguments);
+    let handle = expect_handle(vm, handle)?;
+    vm.scheduler.wait_for_deliveries()?;
+    if vm.heap.slot_or_nil(handle, handle::STATE) == vm.names.known.pending {
+        vm.signal_event(handle, &[])?;
+        vm.heap.slot_set(handle, handle::PROGRESS, values);
+    }
+    Ok(Value::NIL)
+}
+
 pub(super) fn operation_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let handle = expect_handle(vm, arguments[0])?;
     Ok(Value::index(handle::number(&vm.heap, handle) as usize))
