@@ -76,7 +76,7 @@ pub(crate) fn is_condition(forms: &CoreForms, symbol: &Symbol) -> bool {
     !symbol.is_keyword() && (forms.condition_types.contains(symbol) || is_standard(symbol))
 }
 
-fn is_standard(symbol: &Symbol) -> bool {
+pub(crate) fn is_standard(symbol: &Symbol) -> bool {
     (symbol.is_in("COMMON-LISP") || symbol.is_in("ESL")) && parents_of_standard(symbol.name()).is_some()
 }
 
@@ -125,7 +125,7 @@ fn names_above_condition(forms: &CoreForms, condition: &Symbol) -> Vec<String> {
 }
 
 /// Whether `ancestor` is above a cause.
-fn is_above_cause(forms: &CoreForms, cause: &Symbol, ancestor: &Symbol) -> bool {
+pub(crate) fn is_above_cause(forms: &CoreForms, cause: &Symbol, ancestor: &Symbol) -> bool {
     let mut seen: Vec<&Symbol> = Vec::new();
     let mut pending = vec![cause];
     while let Some(symbol) = pending.pop() {

@@ -7,11 +7,11 @@ use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::LambdaId;
 
-use crate::cause::{Applies, clause_applies};
+use crate::cause::{Applies, clause_applies, is_above_cause};
 use crate::forms::DeclaredCauses;
 use crate::guard::LeavingFailures;
-use crate::table::{FailureTable, Maker, shown_function};
-use crate::value::{Code, NO_CONTEXT};
+use crate::table::{FailingTask, FailureTable, Maker, shown_function};
+use crate::value::{Code, NO_CONTEXT, TaskKind};
 
 /// Beginning of the names of the tasks in which scripts of worlds answer.
 pub(crate) const SCRIPTED: &str = "scripted ";
@@ -86,6 +86,58 @@ impl Maker<'_, '_> {
                 let cause = cause.to_string().to_lowercase();
                 let message = format!("`{shown}` declares {cause}, but never fails with it");
                 findings.push(Diagnostic::new("declared-never", Severity::Warning, message, span));
+            }
+        }
+        findings.sort_by_key(|found| {
+            (found.primary.span.source, found.primary.span.start, found.message.clone())
+        });
+        findings
+    }
+
+    /// Returns errors for tasks that end by failures which a declaration for them does not have. A keyword
+    /// that is declared in place of a function names tasks: `:imaging` those of this name, `:tasks` all for
+    /// which no form waits and that begin in the source of the declaration, the main task among them.
+    pub(crate) fn unhandled(&self, tasks: &[FailingTask]) -> Vec<Diagnostic> {
+        let forms = self.flow.forms;
+        let mut findings = Vec::new();
+        for (name, declared) in &forms.declared {
+            if !name.is_keyword() {
+                continue;
+            }
+            let (form, node) = declared.place;
+            let span = forms.forms[form].core.nodes[node.index()].span;
+            let here = self.place(form as u32, node).source;
+            let wanted = name.name().to_lowercase();
+            let is_meant = |task: &&FailingTask| {
+                let is_own = matches!(task.kind, TaskKind::Main | TaskKind::Spawned | TaskKind::Child);
+                match &*wanted {
+                    "tasks" => {
+                        is_own
+                            && !task.is_awaited
+                            && (task.kind == TaskKind::Main || task.place.source == here)
+                    }
+                    wanted => task.name == wanted,
+                }
+            };
+            for task in tasks.iter().filter(is_meant) {
+                for row in task.causes.iter().filter(|row| !row.is_mistake) {
+                    let cause = row.cause.split(' ').next().unwrap_or_default();
+                    let is_declared = |known: &Symbol| {
+                        let cause = Symbol::keyword(&cause.trim_start_matches(':').to_uppercase());
+                        is_above_cause(forms, &cause, known) || known.name() == "GENERAL-FAILURE"
+                    };
+                    if declared.causes.iter().any(is_declared) {
+                        continue;
+                    }
+                    let message =
+                        format!("no clause takes {}, which ends the task `{}`", row.cause, task.name);
+                    let mut found = Diagnostic::new("unhandled-failure", Severity::Error, message, span);
+                    found = match row.origins.first() {
+                        Some(origin) => found.also(origin.span(), "it begins here"),
+                        None => found,
+                    };
+                    findings.push(found);
+                }
             }
         }
         findings.sort_by_key(|found| {

@@ -194,6 +194,8 @@ pub(crate) struct CoreForms {
     pub(crate) forms: Vec<CoreForm>,
     /// Names of the functions that the program defines, each with the form and the node of a definition.
     pub(crate) defined: FxHashMap<Symbol, (usize, NodeId)>,
+    /// Those that it defines more than once.
+    pub(crate) redefined: FxHashSet<Symbol>,
     /// Parents of causes, by `define-cause`, and of conditions, by `define-condition`.
     pub(crate) parents: FxHashMap<Symbol, Vec<Symbol>>,
     /// Names of condition types.
@@ -289,8 +291,10 @@ impl CoreForms {
                 "%SET-FUNCTION" | "%SET-FUNCTION-NAMED" | "(SETF FDEFINITION)" | "(SETF SYMBOL-FUNCTION)",
                 _,
             ) => {
-                if let Some(name) = function_name(&first) {
-                    self.defined.insert(name, (index, node));
+                if let Some(name) = function_name(&first)
+                    && self.defined.insert(name.clone(), (index, node)).is_some()
+                {
+                    self.redefined.insert(name);
                 }
             }
             ("%DEFINE-CAUSE", Some(name)) => {

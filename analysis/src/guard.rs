@@ -47,6 +47,8 @@ pub(crate) struct FailureFacts<'k> {
 /// Result of a handling form.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Handled {
+    /// Failures that come from the body of the form.
+    pub(crate) arriving: LeavingFailures,
     /// Failures that leave the form.
     pub(crate) leaving: LeavingFailures,
     /// Failures that each clause takes; for each, whether it may also go on outward.
@@ -66,6 +68,7 @@ pub(crate) fn recover(
 ) -> Handled {
     let count = clauses.len();
     let mut handled = Handled {
+        arriving: body.clone(),
         leaving: LeavingFailures::default(),
         taken: vec![BTreeSet::new(); count],
         mistakes: vec![0; count],
@@ -135,6 +138,7 @@ pub(crate) fn recover(
 pub(crate) fn take(known: &FailureFacts<'_>, body: &LeavingFailures, types: &[Datum]) -> Handled {
     let count = types.len();
     let mut handled = Handled {
+        arriving: body.clone(),
         leaving: LeavingFailures::default(),
         taken: vec![BTreeSet::new(); count],
         mistakes: vec![0; count],

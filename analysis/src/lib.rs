@@ -12,6 +12,7 @@
 //! "Possible failures" of the manual lists. Not here: reading files, printing.
 #![forbid(unsafe_code)]
 
+mod advice;
 mod call;
 mod cause;
 mod clause;
@@ -22,9 +23,11 @@ mod explain;
 mod flow;
 mod forms;
 mod guard;
+mod handling;
 mod hot;
 mod library;
 mod orders;
+mod resuming;
 mod rights;
 mod solve;
 mod table;
@@ -34,7 +37,8 @@ mod value;
 pub mod render;
 
 use esl_bytecode::compile::MODULE_SOURCES;
-use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::diagnostic::{Diagnostic, Label};
+use esl_bytecode::span::Span;
 use esl_compiler::core::{Core, LambdaId};
 use esl_compiler::diagnostic::Sources;
 
@@ -45,7 +49,9 @@ use table::Maker;
 use value::{Code, NO_CONTEXT};
 
 pub use rights::{NeededRights, needed_rights};
-pub use table::{CauseRow, ClauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow};
+pub use table::{
+    CauseRow, ClauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow, HandlingForm,
+};
 pub use value::TaskKind;
 
 /// Options of an analysis.
@@ -76,13 +82,48 @@ pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -
         }
     }
     let solution = solve::solve(&flow);
-    let maker = Maker { flow: &flow, solution: &solution, sources, all: options.all };
+    let numbers = table::numbers_of(&flow);
+    let maker = Maker { flow: &flow, solution: &solution, sources, all: options.all, numbers };
     let explanation = options.explained.as_ref().map(|cause| maker.explain(cause)).unwrap_or_default();
     (maker.table(), explanation)
 }
 
 /// Codes of the warnings of an analysis.
-pub const WARNINGS: [&str; 2] = ["declared-never", "resource-order"];
+pub const WARNINGS: [&str; 4] = ["clause-never-applies", "declared-never", "endless-retry", "resource-order"];
+
+/// Leaves out the warnings of the compiler about clauses that merely fall off their ends if the program's
+/// functions show that control cannot reach these; to the others it adds the failures that the value of the
+/// clause answers.
+pub fn sharpen(diagnostics: &mut Vec<Diagnostic>, table: &FailureTable) {
+    let of_clause = |diagnostic: &Diagnostic| {
+        let is_it = |clause: &&ClauseRow| diagnostic.primary.span.contains(clause.span);
+        if diagnostic.code == "clause-falls-off" { table.clauses.iter().find(is_it) } else { None }
+    };
+    diagnostics.retain(|diagnostic| of_clause(diagnostic).is_none_or(|clause| !clause.never_ends));
+    for diagnostic in diagnostics {
+        let Some(clause) = of_clause(diagnostic) else { continue };
+        let origins = clause.causes.iter().flat_map(|row| row.origins.iter().map(move |one| (row, one)));
+        let shown: Vec<(String, Span)> = origins
+            .take(MOST_ORIGINS)
+            .map(|(row, origin)| (format!("{} begins here", row.cause), origin.span()))
+            .collect();
+        diagnostic.secondary.extend(shown.into_iter().map(|(text, span)| Label { span, text }));
+    }
+}
+
+/// Most failures that the warning about a clause names.
+const MOST_ORIGINS: usize = 3;
+
+/// Returns the causes with which a function of the library, named in lower case, may fail by itself, apart
+/// from programming errors.
+///
+/// ```
+/// assert_eq!(esl_analysis::causes_of_function("next-bindings"), [":no-more-bindings"]);
+/// ```
+pub fn causes_of_function(name: &str) -> Vec<String> {
+    let causes = library::causes_of(&name.to_uppercase()).iter();
+    causes.map(|cause| format!(":{}", cause.trim_start_matches('!').to_lowercase())).collect()
+}
 
 /// Returns warnings about resources that tasks of a program take in different orders, so that they can
 /// wait for each other.

@@ -1,16 +1,14 @@
 //! The fixed point of effects: the failures that may leave each piece of code, each task and each clause.
 
-use esl_bytecode::builtin::Builtin;
 use esl_bytecode::symbol::Symbol;
-use esl_compiler::core::{Callee, NodeId, NodeKind};
+use esl_compiler::core::NodeId;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::cause::{Applies, clause_applies};
-use crate::clause::can_end;
 use crate::effect::{FailureKind, NodeEffect, mistake};
 use crate::flow::ValueFlow;
-use crate::forms::{CoreForm, CoreForms, ScopeKind};
+use crate::forms::{CoreForm, ScopeKind};
 use crate::guard::{FailureFacts, FailureId, Handled, LeavingFailures, recover, take};
+use crate::resuming::resuming_clauses;
 use crate::value::{Code, Numbering, Spot, WorkId, WorkKey};
 
 /// A failure of the program: its kind, and the form and node where it begins.
@@ -270,67 +268,5 @@ fn kinds_of_host(flow: &ValueFlow<'_>, name: crate::value::NameId) -> Vec<Failur
             names.map(|index| FailureKind::Below(crate::value::NameId(index as u32))).collect()
         }
         None => vec![FailureKind::Unknown(name)],
-    }
-}
-
-/// Returns the cause with which a node fails for sure, or an empty text if it fails with some condition.
-fn failing_call(form: &CoreForm, node: NodeId) -> Option<String> {
-    let (NodeKind::Call(callee, arguments) | NodeKind::Apply(callee, arguments)) = form.kind(node) else {
-        return None;
-    };
-    let name = match callee {
-        Callee::Global(symbol) => symbol.name(),
-        Callee::Builtin(Builtin::Exit) => return Some("".into()),
-        Callee::Builtin(builtin) => builtin.info().name,
-        _ => return None,
-    };
-    match name {
-        "%FAIL-FOR" | "FAIL" => Some(
-            arguments
-                .first()
-                .and_then(|node| form.symbol(*node))
-                .map_or(String::new(), |one| one.name().into()),
-        ),
-        "ERROR" | "%FAIL-WITH" | "%FAIL-BECAUSE-OF" | "%FAIL-AS" | "%FAIL-ALL" | "%NO-CASE" => {
-            Some(String::new())
-        }
-        _ => None,
-    }
-}
-
-/// Returns the clauses whose ends control can reach, so that the failed call gets their value. A failure
-/// inside a clause comes back only if another clause for it can end.
-fn resuming_clauses(forms: &CoreForms) -> FxHashSet<(u32, NodeId, usize)> {
-    let mut found: FxHashSet<(u32, NodeId, usize)> = FxHashSet::default();
-    let mut causes: Vec<Symbol> = Vec::new();
-    loop {
-        let before = found.len();
-        for (number, form) in forms.forms.iter().enumerate() {
-            let comes_back = |cause: &str| {
-                let is_it = |known: &Symbol| {
-                    let mut names = Numbering::default();
-                    let kind =
-                        FailureKind::Cause(crate::value::NameId(names.number(&Symbol::keyword(cause)).0));
-                    clause_applies(forms, &names, kind, known) != Applies::No
-                };
-                if cause.is_empty() { !causes.is_empty() } else { causes.iter().any(is_it) }
-            };
-            let mut more = Vec::new();
-            for scope in &form.scopes {
-                let ScopeKind::Recovery { node, clauses, .. } = &scope.kind else { continue };
-                for (position, clause) in clauses.iter().enumerate() {
-                    let key = (number as u32, *node, position);
-                    let leaves = |node| failing_call(form, node).is_some_and(|cause| !comes_back(&cause));
-                    if !found.contains(&key) && can_end(&form.core, clause.body, &leaves) {
-                        found.insert(key);
-                        more.push(clause.cause.clone());
-                    }
-                }
-            }
-            causes.extend(more);
-        }
-        if found.len() == before {
-            return found;
-        }
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use esl_bytecode::compile::MODULE_SOURCES;
+use esl_bytecode::span::{SourceId, Span};
 use esl_bytecode::symbol::symbol_of_setf_cell;
 use esl_compiler::core::{LambdaId, NodeId, NodeKind};
 use esl_compiler::diagnostic::Sources;
@@ -41,6 +42,16 @@ pub struct FailureOrigin {
     pub place: CodePlace,
     /// Function, mock or task around it.
     pub function: String,
+    /// Range of the form that fails: its source, start and end.
+    range: (u32, u32, u32),
+}
+
+impl FailureOrigin {
+    /// Returns the range of the form that fails.
+    pub fn span(&self) -> Span {
+        let (source, start, end) = self.range;
+        Span::new(SourceId(source), start, end)
+    }
 }
 
 /// A cause of failures, and where they begin.
@@ -101,6 +112,23 @@ pub struct ClauseRow {
     pub causes: Vec<CauseRow>,
     /// Failures that may leave the clause itself.
     pub fails: Vec<CauseRow>,
+    /// Range of its body.
+    pub span: Span,
+    /// Whether control cannot reach its end, as far as the program's functions show.
+    pub never_ends: bool,
+}
+
+/// A form that handles failures of its body.
+#[derive(Clone, Debug)]
+pub struct HandlingForm {
+    /// Place of the form.
+    pub place: CodePlace,
+    /// Range of the form, or of the call of the macro that it belongs to.
+    pub span: Span,
+    /// Failures of the body that a clause takes; a clause may take them in vain.
+    pub taken: Vec<CauseRow>,
+    /// Failures of the body that no clause takes.
+    pub passing: Vec<CauseRow>,
 }
 
 /// The failures of a program.
@@ -112,9 +140,13 @@ pub struct FailureTable {
     pub tasks: Vec<FailingTask>,
     /// Clauses, in the order of the text.
     pub clauses: Vec<ClauseRow>,
+    /// Forms that handle failures, in the order of the text.
+    pub forms: Vec<HandlingForm>,
+    /// Causes that may leave functions of modules which come with the system, by their names in lower case.
+    pub of_modules: BTreeMap<String, Vec<String>>,
     /// Causes that the program declares for functions, by their names in lower case.
     pub declared: BTreeMap<String, Vec<String>>,
-    /// Declarations that do not hold.
+    /// Declarations that do not hold, clauses that never apply, and other warnings.
     pub findings: Vec<esl_bytecode::diagnostic::Diagnostic>,
 }
 
@@ -125,6 +157,17 @@ pub(crate) struct Maker<'m, 'f> {
     pub(crate) sources: &'m Sources,
     /// Whether programming errors are listed.
     pub(crate) all: bool,
+    /// Numbers of the pieces of code of each lambda.
+    pub(crate) numbers: FxHashMap<(u32, LambdaId), Vec<usize>>,
+}
+
+/// Returns the numbers of the pieces of code of each lambda.
+pub(crate) fn numbers_of(flow: &ValueFlow<'_>) -> FxHashMap<(u32, LambdaId), Vec<usize>> {
+    let mut numbers: FxHashMap<(u32, LambdaId), Vec<usize>> = FxHashMap::default();
+    for (number, running) in flow.running.iter().enumerate() {
+        numbers.entry((running.code.form, running.code.lambda)).or_default().push(number);
+    }
+    numbers
 }
 
 impl Maker<'_, '_> {
@@ -137,9 +180,14 @@ impl Maker<'_, '_> {
     /// Returns the place of the first part of a node that has a place of its own; a macro's parts have that
     /// of the call.
     pub(crate) fn place_inside(&self, form: u32, node: NodeId) -> CodePlace {
+        self.place_of(self.span_inside(form, node))
+    }
+
+    /// Returns the range of that part.
+    pub(crate) fn span_inside(&self, form: u32, node: NodeId) -> Span {
         let text = &self.flow.forms.forms[form as usize];
         let whole = text.core.nodes[node.index()].span;
-        let mut best: Option<esl_bytecode::span::Span> = None;
+        let mut best: Option<Span> = None;
         let mut pending = vec![node];
         while let Some(node) = pending.pop() {
             let span = text.core.nodes[node.index()].span;
@@ -152,10 +200,10 @@ impl Maker<'_, '_> {
                 pending.push(text.core.lambdas[lambda.index()].body);
             }
         }
-        self.place_of(best.unwrap_or(whole))
+        best.unwrap_or(whole)
     }
 
-    fn place_of(&self, span: esl_bytecode::span::Span) -> CodePlace {
+    fn place_of(&self, span: Span) -> CodePlace {
         let source = self.sources.name(span.source).unwrap_or_default().to_string();
         match self.sources.place(span) {
             Some(place) => CodePlace { source, line: place.line, column: place.column },
@@ -210,7 +258,9 @@ impl Maker<'_, '_> {
             let failing = self.solution.failures.keys[failure as usize];
             let form = &self.flow.forms.forms[failing.form as usize];
             let function = self.function_around(failing.form, form.owners[failing.node.index()]);
-            let origin = FailureOrigin { place: self.place(failing.form, failing.node), function };
+            let span = form.core.nodes[failing.node.index()].span;
+            let place = self.place(failing.form, failing.node);
+            let origin = FailureOrigin { place, function, range: (span.source.0, span.start, span.end) };
             by_cause.entry(self.cause(failing.kind)).or_default().0.insert(origin);
         }
         let row =
@@ -247,13 +297,34 @@ impl Maker<'_, '_> {
         let clauses = self.clauses();
         let by_scope: FxHashMap<(u32, usize, usize), usize> =
             clauses.iter().enumerate().map(|(index, (key, _))| (*key, index)).collect();
-        FailureTable {
+        let mut table = FailureTable {
             functions: self.functions(),
             tasks: self.tasks(&by_scope),
             clauses: clauses.into_iter().map(|(_, row)| row).collect(),
+            forms: self.handling_forms(),
+            of_modules: self.of_modules(),
             declared: self.declared(),
-            findings: self.findings().into_iter().chain(crate::orders::findings(self.flow)).collect(),
+            findings: self.findings(),
+        };
+        table.findings.extend(self.unhandled(&table.tasks));
+        table.findings.extend(self.advice());
+        table.findings.extend(crate::orders::findings(self.flow));
+        table
+    }
+
+    /// Returns the causes that may leave functions of modules that come with the system.
+    fn of_modules(&self) -> BTreeMap<String, Vec<String>> {
+        let mut rows: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        for (name, (form, node)) in &self.flow.forms.defined {
+            if name.name().starts_with('%') || self.is_own(&self.place(*form as u32, *node).source) {
+                continue;
+            }
+            let Some(leaving) = self.leaving_of(*form as u32, *node) else { continue };
+            let causes = self.rows(leaving.failures.iter().copied(), 0).into_iter().map(|row| row.cause);
+            rows.entry(shown_function(name)).or_default().extend(causes);
         }
+        rows.retain(|_, causes| !causes.is_empty());
+        rows
     }
 
     fn functions(&self) -> Vec<FunctionRow> {
@@ -293,15 +364,12 @@ impl Maker<'_, '_> {
         {
             return Some(self.solution.leaving[number].clone());
         }
+        let numbers = self.numbers.get(&(form, lambda))?;
         let mut all = LeavingFailures::default();
-        let mut is_found = false;
-        for (number, running) in self.flow.running.iter().enumerate() {
-            if running.code.form == form && running.code.lambda == lambda {
-                is_found = true;
-                all.add(&self.solution.leaving[number]);
-            }
+        for number in numbers {
+            all.add(&self.solution.leaving[*number]);
         }
-        is_found.then_some(all)
+        Some(all)
     }
 
     /// Returns the code that a task runs, calls included.

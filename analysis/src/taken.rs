@@ -33,10 +33,12 @@ impl Maker<'_, '_> {
         let mut rows = Vec::new();
         for ((form, scope, position), (taken, mistakes, fails)) in groups {
             let text = &self.flow.forms.forms[form as usize];
+            let mut never_ends = false;
             let (node, wanted, answer) = match &text.scopes[scope].kind {
                 ScopeKind::Recovery { node, clauses, .. } => {
                     let clause = &clauses[position];
                     let resumes = self.solution.resuming.contains(&(form, *node, position));
+                    never_ends = !resumes;
                     let answer = answer_of(clause, resumes, taken.iter().any(|(_, goes_on)| *goes_on));
                     (clause.body, clause.cause.to_string().to_lowercase(), answer)
                 }
@@ -70,6 +72,8 @@ impl Maker<'_, '_> {
                 answer,
                 causes,
                 fails: self.rows_of(&fails),
+                span: self.span_inside(form, node),
+                never_ends,
             };
             rows.push(((form, scope, position), row));
         }

@@ -241,3 +241,108 @@ fn without_a_clause_its_failures_go_outward() {
     check(&mission("(:stuck (abort))"), ":dark");
     check(&mission("(:dark (abort))"), ":stuck");
 }
+
+/// Returns the codes of the findings about a program, with the lines that these are about; those of the
+/// compiler about clauses are among them.
+fn findings(text: &str) -> Vec<(String, usize)> {
+    let mut compiled =
+        compile_with_core(&[Source::new("a.esl", text)], &esl::module_path::ModulePath::none());
+    assert!(!compiled.has_errors(), "{text}: {:?}", compiled.diagnostics);
+    let cores = std::mem::take(&mut compiled.core);
+    let (table, _) = analyze(cores, &compiled.sources, &AnalysisOptions::default());
+    esl_analysis::sharpen(&mut compiled.diagnostics, &table);
+    compiled.diagnostics.retain(|found| found.code == "clause-falls-off");
+    let all = compiled.diagnostics.into_iter().chain(table.findings);
+    all.map(|found| {
+        let line = text[..found.primary.span.start as usize].matches('\n').count() + 1;
+        (found.code.to_string(), line)
+    })
+    .collect()
+}
+
+#[track_caller]
+fn check_findings(text: &str, expected: &[(&str, usize)]) {
+    let expected: Vec<(String, usize)> =
+        expected.iter().map(|(code, line)| ((*code).to_string(), *line)).collect();
+    assert_eq!(findings(text), expected, "{text}");
+}
+
+#[test]
+fn clauses_that_never_apply_are_found() {
+    let drive = "(define-cause :stuck ()) (define-cause :lost ()) (define-cause :jammed (:stuck))
+(defun drive (n) (when (> n 3) (fail :stuck n)))\n";
+    let never = |rest: &str, lines: &[usize]| {
+        let lines: Vec<(&str, usize)> = lines.iter().map(|line| ("clause-never-applies", *line)).collect();
+        check_findings(&format!("{drive}{rest}"), &lines);
+    };
+    never("(with-recovery-procedures ((:stuck (abort)))\n(drive 5))", &[]);
+    never("(with-recovery-procedures ((:stuck (abort))\n(:lost (abort)))\n(drive 5))", &[4]);
+    // A cause below the one that comes is not that one.
+    never("(with-recovery-procedures (\n(:jammed (abort)))\n(drive 5))", &[4]);
+    // Clauses whose bodies call a function that comes from a caller, an operation that is not known, a mock;
+    // limits and errors, which may come to any code.
+    never("(defun twice (f) (with-recovery-procedures ((:lost (abort))) (funcall f)))", &[]);
+    never(
+        "(define-mock look () (when (> (random 3) 1) (fail :stuck)))
+(with-recovery-procedures ((:lost (abort))) (look))",
+        &[],
+    );
+    never("(with-recovery-procedures ((:heap-exhausted (abort)) (:type-error (abort))) (drive 5))", &[]);
+    // A guard fails in the task that it guards.
+    never(
+        "(define-fluent low nil)
+(defun work () (with-recovery-procedures ((:lost (abort))) (drive 5)))
+(with-guardian (wait-until low) (fail :lost) (work))",
+        &[],
+    );
+}
+
+#[test]
+fn endless_retries_and_clauses_that_fall_off_are_found() {
+    let again = |cause: &str, clause: &str| {
+        format!("(with-recovery-procedures (({cause} :retries :infinite\n{clause}))\n(print (car (read))))")
+    };
+    check_findings(&again(":type-error", "(retry)"), &[("endless-retry", 2)]);
+    check_findings(&again(":type-error", "(print 'again) (retry)"), &[("endless-retry", 2)]);
+    check_findings(&again(":type-error", "(sleep 1) (retry)"), &[]);
+    check_findings(&again(":end-of-file", "(retry)"), &[]);
+
+    let clause = |rest: &str| {
+        format!(
+            "(define-cause :stuck ()) (define-cause :over ())\n{rest}
+(with-recovery-procedures (\n(:stuck (give-up)))\n(print (fail :stuck)))"
+        )
+    };
+    // The function may come back, or never does.
+    check_findings(&clause("(defun give-up () (print 1))"), &[("clause-falls-off", 4)]);
+    check_findings(&clause("(defun give-up () (stop))\n(defun stop () (fail :over))"), &[]);
+    check_findings(&clause("(defun give-up () (if (read) (fail :over) (give-up)))"), &[]);
+    // Another clause may answer the failure in its place.
+    let answered = "(define-cause :stuck ()) (define-cause :over ())
+(defun give-up () (fail :over))
+(with-recovery-procedures ((:over (values 1)))
+(with-recovery-procedures (
+(:stuck (give-up)))
+(print (fail :stuck))))";
+    check_findings(answered, &[("clause-falls-off", 5)]);
+}
+
+#[test]
+fn tasks_are_compared_with_their_declarations() {
+    let text = |declared: &str| {
+        format!(
+            "(declaim (fails {declared}))
+(define-cause :stuck ()) (define-cause :jammed (:stuck)) (define-cause :lost ())
+(spawn (:name \"look\") (sleep 1) (fail :lost))
+(spawn (:name \"drive\") (sleep 1) (fail :jammed))
+(sleep 5)"
+        )
+    };
+    let unhandled = |count: usize| vec![("unhandled-failure", 1); count];
+    check_findings(&text(":tasks"), &unhandled(2));
+    check_findings(&text(":tasks :stuck"), &unhandled(1));
+    check_findings(&text(":tasks :stuck :lost"), &[]);
+    check_findings(&text(":look"), &unhandled(1));
+    check_findings(&text(":drive :jammed"), &[]);
+    check_findings(&text(":main"), &[]);
+}

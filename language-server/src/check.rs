@@ -6,17 +6,20 @@ use std::time::Duration;
 
 use esl::module_path::ModulePath;
 use esl::program::{Compiled, Instrumentation, Source, compile_for_run};
+use esl_analysis::AnalysisOptions;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
 use esl_vm::vm::Config;
-use lsp_server::{Message, Notification};
+use lsp_server::{Message, Notification, Request};
 use lsp_types::notification::{Notification as NotificationKind, PublishDiagnostics};
+use lsp_types::request::{CodeLensRefresh, Request as RequestKind};
 use lsp_types::{
     Diagnostic as ShownDiagnostic, DiagnosticRelatedInformation, DiagnosticSeverity, DiagnosticTag, Location,
     NumberOrString, PublishDiagnosticsParams, Uri,
 };
 
 use super::document::{ColumnUnit, OpenText, path_of, uri_of};
+use super::inferred::{InferredText, InferredTexts};
 use super::project::Project;
 
 /// Time without a change after which a text is looked at.
@@ -46,10 +49,15 @@ pub(super) struct Checker {
 }
 
 impl Checker {
-    /// Starts the thread, which publishes what it finds by `sender`.
-    pub(super) fn start(sender: impl Fn(Message) -> bool + Send + 'static) -> Checker {
+    /// Starts the thread, which publishes what it finds by `sender`, and puts the failures of the texts into
+    /// `inferred`. `refreshes` says whether the client can be asked to ask for lenses again.
+    pub(super) fn start(
+        inferred: InferredTexts,
+        refreshes: bool,
+        sender: impl Fn(Message) -> bool + Send + 'static,
+    ) -> Checker {
         let (jobs, coming) = mpsc::channel();
-        let run = move || work(&coming, &sender);
+        let run = move || work(&coming, &inferred, refreshes, &sender);
         // Without the thread there are no diagnostics, and all else works.
         drop(std::thread::Builder::new().name("diagnostics".into()).stack_size(STACK).spawn(run));
         Checker { jobs }
@@ -74,7 +82,13 @@ impl Checker {
     }
 }
 
-fn work(coming: &mpsc::Receiver<CheckJob>, sender: &dyn Fn(Message) -> bool) {
+fn work(
+    coming: &mpsc::Receiver<CheckJob>,
+    inferred: &InferredTexts,
+    refreshes: bool,
+    sender: &dyn Fn(Message) -> bool,
+) {
+    let mut refresh_count = 0;
     let mut waiting: Vec<CheckedText> = Vec::new();
     // The texts of which something was said, by the text that was looked at.
     let mut told: HashMap<String, HashSet<String>> = HashMap::new();
@@ -90,13 +104,19 @@ fn work(coming: &mpsc::Receiver<CheckJob>, sender: &dyn Fn(Message) -> bool) {
             }
             Ok(CheckJob::Forget(uri)) => {
                 waiting.retain(|other| other.uri != uri);
+                inferred.forget(uri.as_str());
                 for other in told.remove(uri.as_str()).unwrap_or_default() {
                     publish(sender, &other, Vec::new(), None);
                 }
             }
             Err(RecvTimeoutError::Timeout) => {
                 let text = waiting.remove(0);
-                let found = look_at(&text);
+                let (found, failures) = look_at(&text);
+                let has_new_failures = failures.is_some();
+                // A text with errors keeps the findings that it had before.
+                if let Some(failures) = failures {
+                    inferred.put(text.uri.as_str(), failures);
+                }
                 let now: HashSet<String> = found.keys().cloned().collect();
                 let key = text.uri.as_str().to_owned();
                 for old in told.insert(key.clone(), now.clone()).unwrap_or_default().difference(&now) {
@@ -105,6 +125,12 @@ fn work(coming: &mpsc::Receiver<CheckJob>, sender: &dyn Fn(Message) -> bool) {
                 for (uri, diagnostics) in found {
                     let version = (uri == key).then_some(text.version);
                     publish(sender, &uri, diagnostics, version);
+                }
+                if refreshes && has_new_failures {
+                    refresh_count += 1;
+                    let id = format!("lenses {refresh_count}").into();
+                    let method = CodeLensRefresh::METHOD.to_owned();
+                    _ = sender(Message::Request(Request::new(id, method, ())));
                 }
             }
             Err(RecvTimeoutError::Disconnected) => return,
@@ -124,12 +150,21 @@ fn publish(
     _ = sender(Message::Notification(Notification::new(method, parameters)));
 }
 
-/// Compiles a text. Returns what is to be said of it, and of the modules that it requires, by their URIs.
-fn look_at(checked: &CheckedText) -> HashMap<String, Vec<ShownDiagnostic>> {
+/// Compiles a text, and finds its possible failures if it has no error. Returns what is to be said of it, and
+/// of the modules that it requires, by their URIs.
+fn look_at(checked: &CheckedText) -> (HashMap<String, Vec<ShownDiagnostic>>, Option<InferredText>) {
     let name = path_of(&checked.uri).display().to_string();
     let source = Source::new(name.clone(), checked.text.as_str());
     let config = Config { budget: Some(BUDGET), ..Config::DEFAULT };
-    let compiled = compile_for_run(&[source], &checked.path, Instrumentation::None, &config, &mut |_| {});
+    let mut compiled = compile_for_run(&[source], &checked.path, Instrumentation::Core, &config, &mut |_| {});
+    let cores = std::mem::take(&mut compiled.core);
+    let mut failures = None;
+    if !compiled.has_errors() && compiled.stopped.is_none() {
+        let (table, _) = esl_analysis::analyze(cores, &compiled.sources, &AnalysisOptions::default());
+        esl_analysis::sharpen(&mut compiled.diagnostics, &table);
+        compiled.diagnostics.extend(table.findings.iter().cloned());
+        failures = Some(InferredText::new(name.clone(), checked.text.clone(), table));
+    }
     let mut texts = ShownTexts { checked, name, compiled: &compiled, known: HashMap::new() };
     let mut found: HashMap<String, Vec<ShownDiagnostic>> = HashMap::new();
     found.insert(checked.uri.as_str().to_owned(), Vec::new());
@@ -143,7 +178,7 @@ fn look_at(checked: &CheckedText) -> HashMap<String, Vec<ShownDiagnostic>> {
             found.entry(uri).or_default().push(shown);
         }
     }
-    found
+    (found, failures)
 }
 
 /// The texts that diagnostics refer to, with their places.

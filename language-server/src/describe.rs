@@ -8,6 +8,7 @@ use lsp_types::{
 
 use super::definition::{DefinedAs, NameDefinition};
 use super::document::OpenText;
+use super::failures;
 use super::project::Project;
 use super::scope::{LocalKind, binding_of};
 
@@ -32,7 +33,10 @@ pub(super) fn hover(project: &Project, parameters: &HoverParams) -> Option<Hover
             if found.is_empty() {
                 return None;
             }
-            let texts: Vec<String> = found.iter().map(|(definition, _)| markdown(definition)).collect();
+            let mut texts: Vec<String> = found.iter().map(|(definition, _)| markdown(definition)).collect();
+            let is_function = found.iter().any(|(definition, _)| definition.kind == DefinedAs::Function);
+            texts.extend(failures::note(project, text, &name).filter(|_| is_function));
+            texts.extend(failures::note_of_form(project, text, node));
             texts.join("\n\n---\n\n")
         }
     };

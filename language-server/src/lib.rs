@@ -1,8 +1,8 @@
 //! `eslc lsp`: a language server over standard input and output, for editors.
 //!
 //! Guarantees: a request is answered from the texts as the editor has them; what is asked of a name works on
-//! the lossless tree, so also in a file that does not compile. Diagnostics are those of the compiler, found
-//! on a thread of its own once the typing pauses. Not here: the messages of the protocol (`lsp-server`,
+//! the lossless tree, so also in a file that does not compile. Diagnostics are those of the compiler
+//! and of the analysis of failures, found on a thread of its own once the typing pauses. Not here: the messages of the protocol (`lsp-server`,
 //! `lsp-types`), formatting ([`esl_format`]).
 //!
 //! ```
@@ -20,7 +20,9 @@ mod definition;
 mod describe;
 mod document;
 mod expand;
+mod failures;
 mod family;
+mod inferred;
 mod layout;
 mod library;
 mod links;
@@ -187,11 +189,16 @@ impl ServedClient {
             }
         };
         let unit = unit_of(&parameters);
+        let workspace = parameters.capabilities.workspace.as_ref();
+        let of_lenses = workspace.and_then(|workspace| workspace.code_lens.as_ref());
+        let refreshes = of_lenses.and_then(|lenses| lenses.refresh_support).unwrap_or(false);
         let roots = parameters.workspace_folders.unwrap_or_default();
         let roots = roots.iter().map(|folder| path_of(&folder.uri)).collect();
         let sender = sender.clone();
-        let checker = Checker::start(move |message| sender.send(sent(message)).is_ok());
-        self.greeted = Some((Project::new(self.folders.clone(), roots, unit), checker));
+        let project = Project::new(self.folders.clone(), roots, unit);
+        let inferred = project.inferred.clone();
+        let checker = Checker::start(inferred, refreshes, move |message| sender.send(sent(message)).is_ok());
+        self.greeted = Some((project, checker));
         let result = serde_json::json!({
             "capabilities": capabilities(unit),
             "serverInfo": { "name": "eslc", "version": env!("CARGO_PKG_VERSION") },

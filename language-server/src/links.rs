@@ -10,6 +10,7 @@ use lsp_types::{
 
 use super::definition::{DefinedAs, definitions};
 use super::document::{OpenText, uri_of};
+use super::failures;
 use super::library::shown_source;
 use super::project::Project;
 
@@ -75,5 +76,5 @@ pub(super) fn lenses(project: &Project, parameters: &CodeLensParams) -> Option<V
         let command = Command::new("Run test".into(), RUN_TEST.into(), Some(arguments));
         CodeLens { range: text.range(test.name_place), command: Some(command), data: None }
     };
-    Some(tests.map(lens).collect())
+    Some(tests.map(lens).chain(failures::lenses(project, text)).collect())
 }

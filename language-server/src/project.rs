@@ -10,6 +10,7 @@ use lsp_types::{Location, Uri};
 
 use super::definition::{NameDefinition, definitions};
 use super::document::{ColumnUnit, OpenText, path_of, uri_of};
+use super::inferred::InferredTexts;
 use super::library::{LanguageName, language, shown_source};
 
 /// Sources of a workspace that are looked at for its symbols, at most.
@@ -24,11 +25,13 @@ pub(super) struct Project {
     pub(super) folders: Vec<PathBuf>,
     /// Folders of the workspace.
     pub(super) roots: Vec<PathBuf>,
+    /// The possible failures of the open texts.
+    pub(super) inferred: InferredTexts,
 }
 
 impl Project {
     pub(super) fn new(folders: Vec<PathBuf>, roots: Vec<PathBuf>, unit: ColumnUnit) -> Project {
-        Project { texts: HashMap::new(), unit, folders, roots }
+        Project { texts: HashMap::new(), unit, folders, roots, inferred: InferredTexts::default() }
     }
 
     pub(super) fn open(&mut self, uri: Uri, version: i32, text: String) {

@@ -9,6 +9,7 @@ use lsp_types::{
 };
 
 use super::document::OpenText;
+use super::failures;
 use super::project::Project;
 use super::scope::binding_of;
 
@@ -26,6 +27,16 @@ pub(super) fn actions(project: &Project, parameters: &CodeActionParams) -> Optio
             diagnostics: Some(vec![diagnostic.clone()]),
             edit: Some(WorkspaceEdit { changes: Some(changes), ..WorkspaceEdit::default() }),
             is_preferred: Some(true),
+            ..CodeAction::default()
+        }));
+    }
+    for (title, kind, edit) in failures::actions(project, text, parameters) {
+        #[allow(clippy::mutable_key_type, reason = "the type of the protocol")]
+        let changes: HashMap<Uri, Vec<TextEdit>> = HashMap::from([(text.uri.clone(), vec![edit])]);
+        actions.push(CodeActionOrCommand::CodeAction(CodeAction {
+            title,
+            kind: Some(kind),
+            edit: Some(WorkspaceEdit { changes: Some(changes), ..WorkspaceEdit::default() }),
             ..CodeAction::default()
         }));
     }
@@ -55,6 +66,13 @@ fn repair(text: &OpenText, diagnostic: &Diagnostic) -> Option<(String, TextEdit)
         ("foreign-word", Some(name)) if help.starts_with("write `") && !name.contains(['(', ' ']) => {
             let place = tree.range(name_at(tree, start)?);
             Some((format!("Write `{name}`"), TextEdit::new(text.range(place), name.to_owned())))
+        }
+        ("unhandled-failure" | "undeclared-failure", _) => {
+            // The range is that of the declaration.
+            let words = diagnostic.message.split(|c: char| c.is_whitespace() || c == ',');
+            let cause = words.into_iter().find(|word| word.starts_with(':'))?;
+            let end = text.offset(diagnostic.range.end).checked_sub(1)?;
+            Some((format!("Declare {cause}"), insert(end, format!(" {cause}"))))
         }
         (_, Some(name)) if help.starts_with("did you mean") => {
             let place = tree.range(name_at(tree, start)?);

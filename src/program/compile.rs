@@ -141,6 +141,8 @@ pub enum Instrumentation {
     Passages,
     /// Points before the uses of places that tasks may share.
     Points,
+    /// None; the core language is kept for an analysis.
+    Core,
 }
 
 /// Compiles sources and their modules to one program, for a run with the settings `config`: the compilation
@@ -162,6 +164,7 @@ pub fn compile_for_run(
         Instrumentation::None => Compiler::default(),
         Instrumentation::Passages => Compiler::default().covered(),
         Instrumentation::Points => Compiler::default().with_points(),
+        Instrumentation::Core => Compiler::default().with_core(),
     };
     compile_in(compiler, sources, path, Modules::Inside, config, watch)
 }

@@ -21,6 +21,11 @@ use crate::value::{CellId, CellKey, Spot};
 
 pub(crate) use rows::{all_causes, function_positions};
 
+/// Returns the causes of a function of the library, as its row has them.
+pub(crate) fn causes_of(name: &str) -> &'static [&'static str] {
+    rows::find(name).causes
+}
+
 /// A call of a function of the library.
 pub(crate) struct LibraryCall<'c> {
     pub(crate) spot: Spot,

@@ -18,6 +18,7 @@ use std::sync::LazyLock;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use esl::module_path::ModulePath;
 use esl::program::{self, Compiled, Modules, Program, Source};
+use esl_analysis::AnalysisOptions;
 use esl_command as command;
 use esl_command::{FAILED, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain};
 use esl_compiler::diagnostic::{Format, Renderer};
@@ -380,7 +381,9 @@ fn check_program(
         let mut compiled = program::compile_with_core(&sources, &options.path(files));
         let cores = std::mem::take(&mut compiled.core);
         if !compiled.has_errors() {
-            compiled.diagnostics.extend(esl_analysis::resource_orders(cores));
+            let (table, _) = esl_analysis::analyze(cores, &compiled.sources, &AnalysisOptions::default());
+            esl_analysis::sharpen(&mut compiled.diagnostics, &table);
+            compiled.diagnostics.extend(table.findings);
         }
         compiled
     })?;

@@ -27,7 +27,9 @@ impl Editor {
         let output = BufReader::new(child.stdout.take().expect("standard output is a pipe"));
         let mut editor = Editor { child, input, output, last_id: 0, told: Default::default() };
         let root = uri(&folder.path().display().to_string());
-        let hello = json!({ "capabilities": {}, "workspaceFolders": [{ "uri": root, "name": "test" }] });
+        let capabilities = json!({ "workspace": { "codeLens": { "refreshSupport": true } } });
+        let hello =
+            json!({ "capabilities": capabilities, "workspaceFolders": [{ "uri": root, "name": "test" }] });
         let answer = editor.ask("initialize", hello);
         assert_eq!(answer["serverInfo"]["name"], "eslc");
         editor.tell("initialized", json!({}));
@@ -109,6 +111,11 @@ impl Editor {
             }
             self.receive();
         }
+    }
+
+    /// Waits until the server has found the failures of a text, so that its lenses are to be asked for again.
+    pub(crate) fn refreshed(&mut self) {
+        while self.receive()["method"] != "workspace/codeLens/refresh" {}
     }
 
     /// Says goodbye.

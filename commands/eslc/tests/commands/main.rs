@@ -7,6 +7,7 @@ mod editors;
 mod failing;
 mod frames;
 mod grammar;
+mod handling;
 mod import;
 mod lsp;
 mod renaming;
