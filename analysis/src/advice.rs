@@ -17,11 +17,13 @@ use crate::table::Maker;
 use crate::value::{Code, TaskKind};
 
 /// Causes that may come to any code from outside: limits, rights, ends of tasks.
-const FROM_OUTSIDE: [&str; 13] = [
+const FROM_OUTSIDE: [&str; 15] = [
     "ABORTED",
     "BUDGET-EXHAUSTED",
     "CANCELLED",
     "HEAP-EXHAUSTED",
+    "INTERRUPTED-BY-RESTART",
+    "LEASE-LOST",
     "MAINTAINED-PROPERTY-VIOLATION",
     "NOT-IN-THIS-WORLD",
     "PERMISSION-DENIED",
@@ -93,7 +95,7 @@ impl Maker<'_, '_> {
                     let message = format!(
                         "this clause begins again without a limit, but {cause} does not go away by itself"
                     );
-                    let help = "give it a number of `:retries`, or change what the failure came from before `(retry)`";
+                    let help = "give it a number of `:retries`, or change the reason of the failure before `(retry)`";
                     found.push(Diagnostic::new("endless-retry", Severity::Warning, message, span).help(help));
                 }
             }
@@ -120,7 +122,9 @@ impl Maker<'_, '_> {
     /// Whether a clause for a cause takes only failures that begin in calls of its body.
     fn comes_only_by_program(&self, wanted: &Symbol, is_interrupted: bool) -> bool {
         let forms = self.flow.forms;
-        if !wanted.is_keyword() || wanted.name() == "GENERAL-FAILURE" {
+        // Causes of modules and of the library may come in ways that the program does not show.
+        let is_own = |(form, node): &(usize, NodeId)| self.is_own(&self.place(*form as u32, *node).source);
+        if !wanted.is_keyword() || !forms.causes.get(wanted).is_some_and(is_own) {
             return false;
         }
         let is_known = mistakes_named(wanted.name()).1 == 0 && !is_standard(&Symbol::cl(wanted.name()));

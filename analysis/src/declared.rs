@@ -10,7 +10,8 @@ use esl_compiler::core::LambdaId;
 use crate::cause::{Applies, clause_applies, is_above_cause};
 use crate::forms::DeclaredCauses;
 use crate::guard::LeavingFailures;
-use crate::table::{FailingTask, FailureTable, Maker, shown_function};
+use crate::row::{FailingTask, FailureTable};
+use crate::table::{Maker, shown_function};
 use crate::value::{Code, NO_CONTEXT, TaskKind};
 
 /// Beginning of the names of the tasks in which scripts of worlds answer.

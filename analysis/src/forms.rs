@@ -198,6 +198,8 @@ pub(crate) struct CoreForms {
     pub(crate) redefined: FxHashSet<Symbol>,
     /// Parents of causes, by `define-cause`, and of conditions, by `define-condition`.
     pub(crate) parents: FxHashMap<Symbol, Vec<Symbol>>,
+    /// Form and node of the definition of each cause.
+    pub(crate) causes: FxHashMap<Symbol, (usize, NodeId)>,
     /// Names of condition types.
     pub(crate) condition_types: FxHashSet<Symbol>,
     /// Declarations of failures, by the names of functions.
@@ -300,6 +302,7 @@ impl CoreForms {
             ("%DEFINE-CAUSE", Some(name)) => {
                 let parents = constant(1).map(symbols).unwrap_or_default();
                 self.declares_causes = true;
+                self.causes.insert(name.clone(), (index, node));
                 self.parents.insert(name, parents);
             }
             ("%DEFINE-CONDITION", Some(name)) => {

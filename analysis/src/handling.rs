@@ -6,7 +6,8 @@ use rustc_hash::FxHashSet;
 
 use crate::forms::ScopeKind;
 use crate::guard::{FailureId, LeavingFailures};
-use crate::table::{HandlingForm, Maker};
+use crate::row::HandlingForm;
+use crate::table::Maker;
 
 impl Maker<'_, '_> {
     /// Returns the forms of the program's own sources that handle failures.

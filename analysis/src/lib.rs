@@ -22,6 +22,7 @@ mod evaluate;
 mod explain;
 mod flow;
 mod forms;
+mod goals;
 mod guard;
 mod handling;
 mod hot;
@@ -29,6 +30,7 @@ mod library;
 mod orders;
 mod resuming;
 mod rights;
+mod row;
 mod solve;
 mod table;
 mod taken;
@@ -49,8 +51,9 @@ use table::Maker;
 use value::{Code, NO_CONTEXT};
 
 pub use rights::{NeededRights, needed_rights};
-pub use table::{
-    CauseRow, ClauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow, HandlingForm,
+pub use row::{
+    CauseRow, ClauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow, GoalMethod,
+    GoalRow, HandlingForm,
 };
 pub use value::TaskKind;
 

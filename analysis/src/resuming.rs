@@ -43,8 +43,8 @@ fn failing_call(form: &CoreForm, node: NodeId) -> Option<String> {
 /// Functions of the program, each with its form and its lambda, and whether control can reach its end.
 type CalledFunctions = FxHashMap<Symbol, (usize, LambdaId, bool)>;
 
-/// Returns the functions of the program that clauses call, directly and by others. Their texts are known: they
-/// are defined once, and neither scripts nor methods take their places.
+/// Returns the functions of the program that clauses call, directly and by others. Their texts are known:
+/// they are defined once, and neither scripts nor methods take their places.
 fn functions_of_clauses(forms: &CoreForms) -> CalledFunctions {
     let mut found = CalledFunctions::default();
     let mut pending: Vec<(usize, NodeId)> = Vec::new();

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use esl_bytecode::compile::MODULE_SOURCES;
-use esl_bytecode::span::{SourceId, Span};
+use esl_bytecode::span::Span;
 use esl_bytecode::symbol::symbol_of_setf_cell;
 use esl_compiler::core::{LambdaId, NodeId, NodeKind};
 use esl_compiler::diagnostic::Sources;
@@ -15,140 +15,9 @@ use crate::effect::{FailureKind, NodeEffect, Reason};
 use crate::flow::ValueFlow;
 use crate::forms::ScopeKind;
 use crate::guard::{FailureId, LeavingFailures};
+use crate::row::{CauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow};
 use crate::solve::{Solution, bodies_of_works};
 use crate::value::{Code, NO_CONTEXT, TaskKind, WorkKey};
-
-/// A place of a program.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct CodePlace {
-    /// Name of the source.
-    pub source: String,
-    /// Line, from 1; 0 if it is unknown.
-    pub line: u32,
-    /// Column, from 1.
-    pub column: u32,
-}
-
-impl std::fmt::Display for CodePlace {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}:{}:{}", self.source, self.line, self.column)
-    }
-}
-
-/// A place where a failure begins, and the function there.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct FailureOrigin {
-    /// Place.
-    pub place: CodePlace,
-    /// Function, mock or task around it.
-    pub function: String,
-    /// Range of the form that fails: its source, start and end.
-    range: (u32, u32, u32),
-}
-
-impl FailureOrigin {
-    /// Returns the range of the form that fails.
-    pub fn span(&self) -> Span {
-        let (source, start, end) = self.range;
-        Span::new(SourceId(source), start, end)
-    }
-}
-
-/// A cause of failures, and where they begin.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CauseRow {
-    /// The cause, such as `:timeout`; `any` if it is not known, `unknown` for a function that is not known.
-    pub cause: String,
-    /// Places where the failures begin, in order.
-    pub origins: Vec<FailureOrigin>,
-    /// Clauses that have taken some of these failures before they went on outward.
-    pub spent: Vec<CodePlace>,
-    /// Whether it is a programming error.
-    pub is_mistake: bool,
-}
-
-/// A function of the program.
-#[derive(Clone, Debug)]
-pub struct FunctionRow {
-    /// Name in lower case.
-    pub name: String,
-    /// Place of the definition.
-    pub place: CodePlace,
-    /// Causes that may leave it.
-    pub causes: Vec<CauseRow>,
-    /// Whether it also fails as functions fail that it is given.
-    pub fails_as_arguments: bool,
-}
-
-/// A task of the program.
-#[derive(Clone, Debug)]
-pub struct FailingTask {
-    /// Name in lower case.
-    pub name: String,
-    /// Kind.
-    pub kind: TaskKind,
-    /// Place of the form that begins it; unknown for the main task.
-    pub place: CodePlace,
-    /// Causes that end it.
-    pub causes: Vec<CauseRow>,
-    /// Whether a form waits for it, and takes its failure.
-    pub is_awaited: bool,
-    /// Clauses in code that it runs, as indices of the rows of clauses.
-    pub clauses: Vec<usize>,
-}
-
-/// A clause that takes failures.
-#[derive(Clone, Debug)]
-pub struct ClauseRow {
-    /// Place of the clause, or of its form.
-    pub place: CodePlace,
-    /// Function around it.
-    pub function: String,
-    /// The cause or the type for which it is written.
-    pub wanted: String,
-    /// Its answer, in words.
-    pub answer: String,
-    /// Failures that it takes.
-    pub causes: Vec<CauseRow>,
-    /// Failures that may leave the clause itself.
-    pub fails: Vec<CauseRow>,
-    /// Range of its body.
-    pub span: Span,
-    /// Whether control cannot reach its end, as far as the program's functions show.
-    pub never_ends: bool,
-}
-
-/// A form that handles failures of its body.
-#[derive(Clone, Debug)]
-pub struct HandlingForm {
-    /// Place of the form.
-    pub place: CodePlace,
-    /// Range of the form, or of the call of the macro that it belongs to.
-    pub span: Span,
-    /// Failures of the body that a clause takes; a clause may take them in vain.
-    pub taken: Vec<CauseRow>,
-    /// Failures of the body that no clause takes.
-    pub passing: Vec<CauseRow>,
-}
-
-/// The failures of a program.
-#[derive(Clone, Debug, Default)]
-pub struct FailureTable {
-    /// Functions, in the order of the text.
-    pub functions: Vec<FunctionRow>,
-    /// Tasks, the main one first.
-    pub tasks: Vec<FailingTask>,
-    /// Clauses, in the order of the text.
-    pub clauses: Vec<ClauseRow>,
-    /// Forms that handle failures, in the order of the text.
-    pub forms: Vec<HandlingForm>,
-    /// Causes that may leave functions of modules which come with the system, by their names in lower case.
-    pub of_modules: BTreeMap<String, Vec<String>>,
-    /// Causes that the program declares for functions, by their names in lower case.
-    pub declared: BTreeMap<String, Vec<String>>,
-    /// Declarations that do not hold, clauses that never apply, and other warnings.
-    pub findings: Vec<esl_bytecode::diagnostic::Diagnostic>,
-}
 
 /// The maker of the table.
 pub(crate) struct Maker<'m, 'f> {
@@ -302,6 +171,7 @@ impl Maker<'_, '_> {
             tasks: self.tasks(&by_scope),
             clauses: clauses.into_iter().map(|(_, row)| row).collect(),
             forms: self.handling_forms(),
+            goals: self.goals(),
             of_modules: self.of_modules(),
             declared: self.declared(),
             findings: self.findings(),

@@ -7,7 +7,8 @@ use esl_compiler::core::NodeKind;
 use crate::clause::{Clause, ClauseLimit};
 use crate::forms::ScopeKind;
 use crate::guard::{FailureId, LeavingFailures};
-use crate::table::{ClauseRow, Maker};
+use crate::row::ClauseRow;
+use crate::table::Maker;
 use crate::value::Code;
 
 impl Maker<'_, '_> {

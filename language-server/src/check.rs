@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use esl::module_path::ModulePath;
 use esl::program::{Compiled, Instrumentation, Source, compile_for_run};
@@ -24,6 +24,8 @@ use super::project::Project;
 
 /// Time without a change after which a text is looked at.
 const PAUSE: Duration = Duration::from_millis(150);
+/// Time that an analysis may take before the findings of the compiler are told without it.
+const PATIENCE: Duration = Duration::from_millis(100);
 /// Ticks that the macros of a text may use.
 const BUDGET: u64 = 50_000_000;
 /// Native stack of the thread: the compiler takes more by itself.
@@ -89,8 +91,9 @@ fn work(
     sender: &dyn Fn(Message) -> bool,
 ) {
     let mut refresh_count = 0;
+    // Times that the analyses of texts have taken.
+    let mut lasted: HashMap<String, Duration> = HashMap::new();
     let mut waiting: Vec<CheckedText> = Vec::new();
-    // The texts of which something was said, by the text that was looked at.
     let mut told: HashMap<String, HashSet<String>> = HashMap::new();
     loop {
         let next = match waiting.is_empty() {
@@ -111,20 +114,20 @@ fn work(
             }
             Err(RecvTimeoutError::Timeout) => {
                 let text = waiting.remove(0);
-                let (found, failures) = look_at(&text);
+                let key = text.uri.as_str().to_owned();
+                let mut compiled = compile(&text);
+                // The findings of a long analysis do not keep those of the compiler waiting.
+                if lasted.get(&key).is_some_and(|time| *time > PATIENCE) {
+                    tell(sender, &mut told, &text, &compiled);
+                }
+                let begun = Instant::now();
+                let failures = failures_of(&text, &mut compiled);
+                lasted.insert(key.clone(), begun.elapsed());
+                tell(sender, &mut told, &text, &compiled);
                 let has_new_failures = failures.is_some();
                 // A text with errors keeps the findings that it had before.
                 if let Some(failures) = failures {
-                    inferred.put(text.uri.as_str(), failures);
-                }
-                let now: HashSet<String> = found.keys().cloned().collect();
-                let key = text.uri.as_str().to_owned();
-                for old in told.insert(key.clone(), now.clone()).unwrap_or_default().difference(&now) {
-                    publish(sender, old, Vec::new(), None);
-                }
-                for (uri, diagnostics) in found {
-                    let version = (uri == key).then_some(text.version);
-                    publish(sender, &uri, diagnostics, version);
+                    inferred.put(&key, failures);
                 }
                 if refreshes && has_new_failures {
                     refresh_count += 1;
@@ -150,22 +153,50 @@ fn publish(
     _ = sender(Message::Notification(Notification::new(method, parameters)));
 }
 
-/// Compiles a text, and finds its possible failures if it has no error. Returns what is to be said of it, and
-/// of the modules that it requires, by their URIs.
-fn look_at(checked: &CheckedText) -> (HashMap<String, Vec<ShownDiagnostic>>, Option<InferredText>) {
-    let name = path_of(&checked.uri).display().to_string();
-    let source = Source::new(name.clone(), checked.text.as_str());
+/// Compiles a text.
+fn compile(checked: &CheckedText) -> Compiled {
+    let source = Source::new(path_of(&checked.uri).display().to_string(), checked.text.as_str());
     let config = Config { budget: Some(BUDGET), ..Config::DEFAULT };
-    let mut compiled = compile_for_run(&[source], &checked.path, Instrumentation::Core, &config, &mut |_| {});
-    let cores = std::mem::take(&mut compiled.core);
-    let mut failures = None;
-    if !compiled.has_errors() && compiled.stopped.is_none() {
-        let (table, _) = esl_analysis::analyze(cores, &compiled.sources, &AnalysisOptions::default());
-        esl_analysis::sharpen(&mut compiled.diagnostics, &table);
-        compiled.diagnostics.extend(table.findings.iter().cloned());
-        failures = Some(InferredText::new(name.clone(), checked.text.clone(), table));
+    compile_for_run(&[source], &checked.path, Instrumentation::Core, &config, &mut |_| {})
+}
+
+/// Finds the possible failures of a text without errors, and adds the findings to those of the compiler.
+fn failures_of(checked: &CheckedText, compiled: &mut Compiled) -> Option<InferredText> {
+    if compiled.has_errors() || compiled.stopped.is_some() {
+        return None;
     }
-    let mut texts = ShownTexts { checked, name, compiled: &compiled, known: HashMap::new() };
+    let cores = std::mem::take(&mut compiled.core);
+    let (table, _) = esl_analysis::analyze(cores, &compiled.sources, &AnalysisOptions::default());
+    esl_analysis::sharpen(&mut compiled.diagnostics, &table);
+    compiled.diagnostics.extend(table.findings.iter().cloned());
+    let name = path_of(&checked.uri).display().to_string();
+    Some(InferredText::new(name, checked.text.clone(), table))
+}
+
+/// Publishes what was found in a text and in the modules that it requires, and takes back what was told of
+/// other texts before. `told` has the texts of which something was said, by the text that was looked at.
+fn tell(
+    sender: &dyn Fn(Message) -> bool,
+    told: &mut HashMap<String, HashSet<String>>,
+    text: &CheckedText,
+    compiled: &Compiled,
+) {
+    let found = shown(text, compiled);
+    let now: HashSet<String> = found.keys().cloned().collect();
+    let key = text.uri.as_str().to_owned();
+    for old in told.insert(key.clone(), now.clone()).unwrap_or_default().difference(&now) {
+        publish(sender, old, Vec::new(), None);
+    }
+    for (uri, diagnostics) in found {
+        let version = (uri == key).then_some(text.version);
+        publish(sender, &uri, diagnostics, version);
+    }
+}
+
+/// Returns what is to be said of a text, and of the modules that it requires, by their URIs.
+fn shown(checked: &CheckedText, compiled: &Compiled) -> HashMap<String, Vec<ShownDiagnostic>> {
+    let name = path_of(&checked.uri).display().to_string();
+    let mut texts = ShownTexts { checked, name, compiled, known: HashMap::new() };
     let mut found: HashMap<String, Vec<ShownDiagnostic>> = HashMap::new();
     found.insert(checked.uri.as_str().to_owned(), Vec::new());
     if compiled.stopped.is_some() {
@@ -178,7 +209,7 @@ fn look_at(checked: &CheckedText) -> (HashMap<String, Vec<ShownDiagnostic>>, Opt
             found.entry(uri).or_default().push(shown);
         }
     }
-    (found, failures)
+    found
 }
 
 /// The texts that diagnostics refer to, with their places.

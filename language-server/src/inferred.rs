@@ -1,8 +1,8 @@
 //! The possible failures of the open texts, as the analysis has found them: put here by the thread of
 //! diagnostics, read by answers.
 //!
-//! An answer may come while the text has changed already. The places of the analysed text before the first and
-//! behind the last changed byte are known then, those between are not.
+//! An answer may come while the text has changed already. The places of the analysed text before the first
+//! and behind the last changed byte are known then, those between are not.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -1,9 +1,9 @@
 //! `eslc lsp`: a language server over standard input and output, for editors.
 //!
 //! Guarantees: a request is answered from the texts as the editor has them; what is asked of a name works on
-//! the lossless tree, so also in a file that does not compile. Diagnostics are those of the compiler
-//! and of the analysis of failures, found on a thread of its own once the typing pauses. Not here: the messages of the protocol (`lsp-server`,
-//! `lsp-types`), formatting ([`esl_format`]).
+//! the lossless tree, so also in a file that does not compile. Diagnostics are those of the compiler and of
+//! the analysis of failures, found on a thread of its own once the typing pauses. Not here: the messages of
+//! the protocol (`lsp-server`, `lsp-types`), formatting ([`esl_format`]).
 //!
 //! ```
 //! use esl_language_server::{ServeError, serve};

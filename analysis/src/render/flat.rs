@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::text::{end_of, origins};
-use crate::table::FailureTable;
+use crate::row::FailureTable;
 
 /// Lines of cells; the first has the headings.
 pub(super) type CellLines = Vec<Vec<String>>;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use super::flat::CellLines;
 use super::injected::{InjectedOutcomes, end_effect, exercised};
 use super::text::end_of;
-use crate::table::{CauseRow, FailureOrigin, FailureTable};
+use crate::row::{CauseRow, FailureOrigin, FailureTable};
 use crate::value::TaskKind;
 
 const HEADINGS: [&str; 10] = [

@@ -1,12 +1,12 @@
-//! The program as a picture: sources of failures on the left, clauses that take them in the middle, tasks on
-//! the right, and an arrow from each failure to each place that takes it. Three layers in the order of the
-//! text, in SVG.
+//! The program as a picture: sources of failures on the left, clauses that take them and goals in the middle,
+//! tasks on the right, and an arrow from each failure to each place that takes it. Three layers in the order
+//! of the text, in SVG, with colours for light and dark screens.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::text::end_of;
-use crate::table::{CauseRow, FailureTable};
+use crate::row::{CauseRow, FailureTable};
 use crate::value::TaskKind;
 
 /// Width of a character, and heights of a line and of a title, in pixels.
@@ -23,10 +23,33 @@ const HEADING: usize = 34;
 /// Most characters of a line.
 const MOST_CHARACTERS: usize = 58;
 
-/// Colours of causes: dark enough for text on white.
-const COLOURS: [&str; 8] =
-    ["#1f5fa8", "#b3541e", "#2c7a3f", "#8a3d99", "#a8323a", "#6b5a00", "#007480", "#5a4fcf"];
-const ENDS: &str = "#c01818";
+/// Number of the colours of causes, which are the classes `c0`, `c1` and so on.
+const COLOURS: usize = 8;
+/// Classes of other colours: of ends by failure, of plain texts, of ends without failure.
+const ENDS: &str = "bad";
+const PLAIN: &str = "plain";
+const GOOD: &str = "good";
+
+/// Colours and fonts. Texts are dark enough for white, and light enough for black.
+const STYLE: &str = "svg { --ground: #fff; --box: #fff; --line: #999; --text: #222; --dim: #666; \
+--c0: #1f5fa8; --c1: #b3541e; --c2: #2c7a3f; --c3: #8a3d99; --c4: #a8323a; --c5: #6b5a00; --c6: #007480; --c7: #5a4fcf; \
+--bad: #c01818; --good: #2c7a3f }
+@media (prefers-color-scheme: dark) { svg { --ground: #14171c; --box: #1b2027; \
+--line: #4a5462; --text: #dde4ec; --dim: #8b98a8; --c0: #6fb1ff; --c1: #f0965a; --c2: #5fcf80; --c3: #d58ae6; --c4: #ff8088; --c5: #d6c04a; \
+--c6: #4fd0dd; --c7: #a59cff; --bad: #ff6d61; --good: #5fcf80 } }
+text { font: 11.5px monospace; white-space: pre; fill: var(--text) }
+.title { font-weight: bold; font-size: 12.5px } .heading { font: bold 14px sans-serif; fill: var(--dim) }
+text.note { fill: var(--dim) } rect { fill: var(--box); fill-opacity: 0.92; stroke: var(--line) }
+rect.ground { fill: var(--ground); fill-opacity: 1; stroke: none }
+.c0 { --own: var(--c0) } .c1 { --own: var(--c1) } .c2 { --own: var(--c2) } .c3 { --own: var(--c3) }
+.c4 { --own: var(--c4) } .c5 { --own: var(--c5) } .c6 { --own: var(--c6) } .c7 { --own: var(--c7) }
+.bad { --own: var(--bad) } .good { --own: var(--good) } .plain { --own: var(--text) }
+.calls { --own: var(--dim) }
+text.c0, text.c1, text.c2, text.c3, text.c4, text.c5, text.c6, text.c7, text.bad, text.good,
+.tip { fill: var(--own) }
+.arrow { fill: none; stroke: var(--own) } .takes { stroke-width: 1.4; stroke-opacity: 0.75 }
+.ends { stroke-width: 1.2; stroke-opacity: 0.5; stroke-dasharray: 5 3 }
+.calls { stroke-width: 1.2; stroke-opacity: 0.7; stroke-dasharray: 1 3 }";
 
 /// A line of a box.
 struct BoxLine {
@@ -64,6 +87,8 @@ impl GraphBox {
 struct Layer {
     heading: &'static str,
     boxes: Vec<GraphBox>,
+    /// Heading above the boxes from a place on.
+    second: Option<(usize, &'static str)>,
     x: usize,
     width: usize,
 }
@@ -71,14 +96,17 @@ struct Layer {
 impl Layer {
     fn new(heading: &'static str, boxes: Vec<GraphBox>) -> Layer {
         let width = boxes.iter().map(GraphBox::width).max().unwrap_or(0);
-        Layer { heading, boxes, x: 0, width: width.max(heading.len() * 9) }
+        Layer { heading, boxes, second: None, x: 0, width: width.max(heading.len() * 9) }
     }
 
     /// Puts the boxes below each other.
     fn place(&mut self, x: usize) {
         self.x = x;
         let mut y = MARGIN + HEADING;
-        for one in &mut self.boxes {
+        for (place, one) in self.boxes.iter_mut().enumerate() {
+            if self.second.is_some_and(|(first, _)| first == place) {
+                y += HEADING;
+            }
             one.y = y;
             y += one.height() + GAP;
         }
@@ -106,7 +134,7 @@ impl FailureSources {
     fn new(table: &FailureTable) -> FailureSources {
         let clauses = table.clauses.iter().flat_map(|clause| &clause.causes);
         let tasks = table.tasks.iter().flat_map(|task| &task.causes);
-        let mut found: BTreeMap<(&crate::table::CodePlace, &str), Vec<&str>> = BTreeMap::new();
+        let mut found: BTreeMap<(&crate::row::CodePlace, &str), Vec<&str>> = BTreeMap::new();
         for row in clauses.chain(tasks) {
             for origin in &row.origins {
                 let causes = found.entry((&origin.place, &origin.function)).or_default();
@@ -123,7 +151,7 @@ impl FailureSources {
                 functions.len() - 1
             });
             for cause in causes {
-                let next = colours.len() % COLOURS.len();
+                let next = colours.len() % COLOURS;
                 colours.entry(cause.to_string()).or_insert(next);
                 if !functions[place].1.iter().any(|known| known == cause) {
                     functions[place].1.push(cause.to_string());
@@ -134,7 +162,7 @@ impl FailureSources {
     }
 
     fn colour(&self, cause: &str) -> String {
-        COLOURS[self.colours.get(cause).copied().unwrap_or_default()].to_string()
+        format!("c{}", self.colours.get(cause).copied().unwrap_or_default())
     }
 
     /// Returns the places of the failures of a row: of the function, and of the cause in it.
@@ -196,7 +224,7 @@ fn clauses(table: &FailureTable, sources: &FailureSources) -> (Layer, Vec<GraphA
         let text = cut(&format!("{}  {}", clause.wanted, short_answer(&clause.answer)));
         let colour = match sources.colours.contains_key(&clause.wanted) {
             true => sources.colour(&clause.wanted),
-            false => "#222".to_string(),
+            false => PLAIN.to_string(),
         };
         boxes[place].lines.push(BoxLine { text, colour });
         for row in &clause.causes {
@@ -234,13 +262,42 @@ fn tasks(table: &FailureTable, sources: &FailureSources) -> (Layer, Vec<GraphArr
             lines.push(BoxLine { text: row.cause.clone(), colour: ENDS.into() });
         }
         let (text, colour) = match task.causes.is_empty() {
-            true => ("no failure ends it", "#2c7a3f"),
+            true => ("no failure ends it", GOOD),
             false => (end_of(task), ENDS),
         };
         lines.push(BoxLine { text: cut(text), colour: colour.into() });
         boxes.push(GraphBox { title: task.name.clone(), note, lines, y: 0 });
     }
     (Layer::new("tasks", boxes), arrows)
+}
+
+/// Adds the goals below the clauses. Returns the arrows from their methods to the functions of the clauses.
+fn goals(table: &FailureTable, clauses: &mut Layer) -> Vec<GraphArrow> {
+    let mut arrows = Vec::new();
+    let first = clauses.boxes.len();
+    for goal in &table.goals {
+        let mut lines = Vec::new();
+        for method in &goal.methods {
+            for called in &method.calls {
+                if let Some(place) = clauses.boxes[..first].iter().position(|one| one.title == *called) {
+                    let from = (clauses.boxes.len(), lines.len());
+                    arrows.push(GraphArrow { from, to: (place, 0), colour: "calls".into() });
+                }
+            }
+            let text = cut(&format!("{}: {}", method.test, method.calls.join(", ")));
+            lines.push(BoxLine { text, colour: PLAIN.into() });
+        }
+        let note = match goal.pursued_in.is_empty() {
+            true => String::new(),
+            false => cut(&format!("in {}", goal.pursued_in.join(", "))),
+        };
+        clauses.boxes.push(GraphBox { title: goal.title.clone(), note, lines, y: 0 });
+    }
+    if !table.goals.is_empty() {
+        clauses.second = Some((first, "goals and their methods"));
+        clauses.width = clauses.boxes.iter().map(GraphBox::width).max().unwrap_or(0);
+    }
+    arrows
 }
 
 /// Orders the boxes of the first layer by the heights to which their arrows lead.
@@ -264,30 +321,22 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-fn draw_layer(svg: &mut String, layer: &Layer) {
+fn draw_heading(svg: &mut String, x: usize, y: usize, heading: &str) {
     // Writing to a text does not fail.
-    _ = writeln!(
-        svg,
-        "<text class=\"heading\" x=\"{}\" y=\"{}\">{}</text>",
-        layer.x,
-        MARGIN + 12,
-        layer.heading
-    );
-    for one in &layer.boxes {
+    _ = writeln!(svg, "<text class=\"heading\" x=\"{x}\" y=\"{y}\">{heading}</text>");
+}
+
+fn draw_layer(svg: &mut String, layer: &Layer) {
+    draw_heading(svg, layer.x, MARGIN + 12, layer.heading);
+    for (place, one) in layer.boxes.iter().enumerate() {
         let (x, y) = (layer.x, one.y);
-        _ = writeln!(
-            svg,
-            "<rect x=\"{x}\" y=\"{y}\" width=\"{}\" height=\"{}\" rx=\"4\"/>",
-            layer.width,
-            one.height()
-        );
-        _ = writeln!(
-            svg,
-            "<text class=\"title\" x=\"{}\" y=\"{}\">{}</text>",
-            x + 8,
-            y + 16,
-            escaped(&one.title)
-        );
+        if let Some((_, heading)) = layer.second.filter(|(first, _)| *first == place) {
+            draw_heading(svg, x, y - GAP - 6, heading);
+        }
+        let (width, height) = (layer.width, one.height());
+        _ = writeln!(svg, "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"4\"/>");
+        let title = escaped(&one.title);
+        _ = writeln!(svg, "<text class=\"title\" x=\"{}\" y=\"{}\">{title}</text>", x + 8, y + 16);
         let mut at = y + TITLE + 12;
         if !one.note.is_empty() {
             _ = writeln!(
@@ -300,7 +349,7 @@ fn draw_layer(svg: &mut String, layer: &Layer) {
         }
         for line in &one.lines {
             let text = escaped(&line.text);
-            _ = writeln!(svg, "<text x=\"{}\" y=\"{at}\" fill=\"{}\">{text}</text>", x + 8, line.colour);
+            _ = writeln!(svg, "<text class=\"{}\" x=\"{}\" y=\"{at}\">{text}</text>", line.colour, x + 8);
             at += LINE;
         }
     }
@@ -308,17 +357,21 @@ fn draw_layer(svg: &mut String, layer: &Layer) {
 
 fn draw_arrows(svg: &mut String, arrows: &[GraphArrow], from: &Layer, to: &Layer, class: &str) {
     for arrow in arrows {
-        let (x, y) = (from.x + from.width, from.boxes[arrow.from.0].middle(arrow.from.1));
-        let (end_x, end_y) = (to.x - 6, to.boxes[arrow.to.0].middle(arrow.to.1));
+        let (y, end_y) =
+            (from.boxes[arrow.from.0].middle(arrow.from.1), to.boxes[arrow.to.0].middle(arrow.to.1));
         let bend = BETWEEN * 2 / 3;
         let colour = &arrow.colour;
+        // An arrow inside of a layer goes around on the right.
+        let x = from.x + from.width;
+        let (second, end, tip) = match from.x < to.x {
+            true => (to.x - 6 - bend, to.x - 6, format!("M{} {end_y} l-7 -4 v8 z", to.x)),
+            false => (x + bend, x + 6, format!("M{x} {end_y} l7 -4 v8 z")),
+        };
+        let first = x + bend;
         _ = writeln!(
             svg,
-            "<path class=\"{class}\" stroke=\"{colour}\" d=\"M{x} {y} C{} {y} {} {end_y} {end_x} {end_y}\"/>\
-             <path fill=\"{colour}\" d=\"M{} {end_y} l-7 -4 v8 z\"/>",
-            x + bend,
-            end_x - bend,
-            end_x + 6,
+            "<path class=\"arrow {class} {colour}\" d=\"M{x} {y} C{first} {y} {second} {end_y} {end} {end_y}\"/>\
+             <path class=\"tip {colour}\" d=\"{tip}\"/>",
         );
     }
 }
@@ -332,6 +385,7 @@ pub(super) fn render(table: &FailureTable, title: &str) -> String {
     let mut left = sources.layer();
     let (mut middle, taken) = clauses(table, &sources);
     let (mut right, ends) = tasks(table, &sources);
+    let methods = goals(table, &mut middle);
     left.place(MARGIN);
     middle.place(left.x + left.width + BETWEEN);
     right.place(middle.x + middle.width + BETWEEN);
@@ -339,14 +393,11 @@ pub(super) fn render(table: &FailureTable, title: &str) -> String {
     let height = left.bottom().max(middle.bottom()).max(right.bottom()) + MARGIN;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} \
-         {height}\">\n<title>{}</title>\n<style>text {{ font: 11.5px monospace; white-space: pre }} \
-         .title {{ font-weight: bold; font-size: 12.5px }} .heading {{ font: bold 14px sans-serif; fill: #444 }} \
-         .note {{ fill: #666 }} rect {{ fill: #fff; fill-opacity: 0.92; stroke: #999 }} \
-         path {{ fill-opacity: 1 }} .takes {{ fill: none; stroke-width: 1.4; stroke-opacity: 0.75 }} \
-         .ends {{ fill: none; stroke-width: 1.2; stroke-opacity: 0.5; stroke-dasharray: 5 3 }}</style>\n\
-         <rect x=\"0\" y=\"0\" width=\"{width}\" height=\"{height}\" style=\"stroke: none; fill-opacity: 1\"/>\n",
+         {height}\">\n<title>{}</title>\n<style>{STYLE}</style>\n\
+         <rect class=\"ground\" width=\"{width}\" height=\"{height}\"/>\n",
         escaped(title)
     );
+    draw_arrows(&mut svg, &methods, &middle, &middle, "calls");
     draw_arrows(&mut svg, &ends, &left, &right, "ends");
     draw_arrows(&mut svg, &taken, &left, &middle, "takes");
     for layer in [&left, &middle, &right] {

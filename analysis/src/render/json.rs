@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::text::end_of;
-use crate::table::{CauseRow, CodePlace, FailureTable};
+use crate::row::{CauseRow, CodePlace, FailureTable};
 
 fn place(place: &CodePlace) -> Value {
     if place.source.is_empty() {
@@ -14,7 +14,7 @@ fn place(place: &CodePlace) -> Value {
 
 fn causes(rows: &[CauseRow]) -> Value {
     let row = |row: &CauseRow| {
-        let origin = |origin: &crate::table::FailureOrigin| json!({ "function": origin.function, "place": place(&origin.place) });
+        let origin = |origin: &crate::row::FailureOrigin| json!({ "function": origin.function, "place": place(&origin.place) });
         json!({
             "cause": row.cause,
             "origins": row.origins.iter().map(origin).collect::<Vec<_>>(),
@@ -54,10 +54,20 @@ pub(super) fn render(table: &FailureTable) -> String {
             "fails": causes(&clause.fails),
         })
     });
+    let goals = table.goals.iter().map(|goal| {
+        let method = |method: &crate::GoalMethod| json!({ "test": method.test, "calls": method.calls });
+        json!({
+            "goal": goal.title,
+            "place": place(&goal.place),
+            "methods": goal.methods.iter().map(method).collect::<Vec<_>>(),
+            "pursued-in": goal.pursued_in,
+        })
+    });
     let all = json!({
         "tasks": tasks.collect::<Vec<_>>(),
         "functions": functions.collect::<Vec<_>>(),
         "clauses": clauses.collect::<Vec<_>>(),
+        "goals": goals.collect::<Vec<_>>(),
     });
     format!("{all:#}\n")
 }

@@ -7,7 +7,7 @@ mod injected;
 mod json;
 mod text;
 
-use crate::table::FailureTable;
+use crate::row::FailureTable;
 
 pub use injected::{InjectedError, InjectedOutcomes};
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::table::{CauseRow, CodePlace, FailingTask, FailureTable};
+use crate::row::{CauseRow, CodePlace, FailingTask, FailureTable};
 use crate::value::TaskKind;
 
 /// Most origins that one row shows.
@@ -75,7 +75,7 @@ pub(super) fn render(table: &FailureTable) -> String {
         text.push('\n');
     }
     let shown =
-        |function: &&crate::table::FunctionRow| !function.causes.is_empty() || function.fails_as_arguments;
+        |function: &&crate::row::FunctionRow| !function.causes.is_empty() || function.fails_as_arguments;
     for function in table.functions.iter().filter(shown) {
         _ = writeln!(text, "function {} ({})", function.name, short(&function.place));
         causes(&mut text, &function.causes, 2);

@@ -45,12 +45,26 @@ fn possible_failures_are_listed() {
 }
 
 #[test]
-fn the_picture_shows_failures_and_clauses() {
-    let folder = Folder::with("failing-graph", &[("mission.esl", MISSION)]);
+fn the_picture_shows_failures_clauses_and_goals() {
+    let goal = "(defun there (metres) (> metres 1))
+(defun near (metres) (with-recovery-procedures ((:lost (abort))) (drive metres)))
+(to-achieve (there metres) ((< metres 3) (near metres)) (t (drive metres)))
+(defun go-there (metres) (achieve (there metres)))\n";
+    let text = format!("{MISSION}{goal}");
+    let folder = Folder::with("failing-graph", &[("mission.esl", &text)]);
     let (status, output, errors) = run(&folder, &["graph", "mission.esl"]);
     assert_eq!(status, Some(0), "{errors}");
     assert!(output.starts_with("<svg ") && output.ends_with("</svg>\n"), "{output}");
-    assert!(output.contains(">:lost</text>") && output.contains("class=\"takes\""), "{output}");
+    assert!(output.contains(">:lost</text>") && output.contains("class=\"arrow takes "), "{output}");
+    for said in [
+        ">(there metres)</text>",
+        ">in go-there</text>",
+        ">(&lt; metres 3): near</text>",
+        ">otherwise: drive</text>",
+    ] {
+        assert!(output.contains(said), "{said}: {output}");
+    }
+    assert_eq!(output.matches("class=\"arrow calls").count(), 1, "the one from the goal to `near`: {output}");
 }
 
 #[test]
