@@ -62,6 +62,8 @@ pub struct FunctionRow {
     pub name: String,
     /// Place of the definition.
     pub place: CodePlace,
+    /// Its last line.
+    pub last_line: u32,
     /// Causes that may leave it.
     pub causes: Vec<CauseRow>,
     /// Whether it also fails as functions fail that it is given.

@@ -209,7 +209,11 @@ impl Maker<'_, '_> {
             let fails_as_arguments =
                 lambda.is_some_and(|lambda| self.flow.calls_arguments.contains(&(*form as u32, lambda.0)));
             let causes = self.rows_of(&leaving);
-            rows.push(FunctionRow { name: shown_function(name), place, causes, fails_as_arguments });
+            let span = self.flow.forms.forms[*form].core.nodes[node.index()].span;
+            let last = Span { start: span.end.saturating_sub(1).max(span.start), ..span };
+            let last_line = self.sources.place(last).map_or(place.line, |place| place.line);
+            let name = shown_function(name);
+            rows.push(FunctionRow { name, place, last_line, causes, fails_as_arguments });
         }
         rows.sort_by(|left, right| (&left.place, &left.name).cmp(&(&right.place, &right.name)));
         rows

@@ -46,6 +46,7 @@ use std::fmt;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use esl_host::{Incoming, SurveyRequest};
@@ -77,6 +78,30 @@ pub struct ServedPlaces {
     /// File with certificates, in PEM, and file with the key of the first. With them, all that listens at an
     /// address speaks TLS; an address that other machines reach asks for it.
     pub identity: Option<(PathBuf, PathBuf)>,
+    /// The picture of the program that the monitor shows live.
+    pub mission: Option<MissionPicture>,
+}
+
+/// Returns a picture of a program in SVG, or `None` if there is none.
+type DrawMission = dyn Fn() -> Option<String> + Send + Sync;
+
+/// A picture of a program in SVG, drawn when a viewer wants to see it. The monitor finds in it tasks,
+/// functions and failures by the attributes `data-name`, `data-range`, `data-begins`, `data-from` and
+/// `data-to`.
+#[derive(Clone)]
+pub struct MissionPicture(Arc<DrawMission>);
+
+impl MissionPicture {
+    /// Creates one from the function that draws it, which is called on a thread of its own.
+    pub fn new(draw: impl Fn() -> Option<String> + Send + Sync + 'static) -> MissionPicture {
+        MissionPicture(Arc::new(draw))
+    }
+}
+
+impl fmt::Debug for MissionPicture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("MissionPicture")
+    }
 }
 
 /// Reason why a run is not served.
@@ -281,7 +306,14 @@ impl ServedPlaces {
                 say(&format!("; monitor at {scheme}://{address}/#token=SECRET"));
             }
             let program = program.to_string();
-            let handle = monitor::serve(listener, identity.clone(), scope.clone(), secrets, program);
+            let handle = monitor::serve(
+                listener,
+                identity.clone(),
+                scope.clone(),
+                secrets,
+                program,
+                self.mission.clone(),
+            );
             served.monitor = Some(handle?);
         }
         if let Some(place) = &self.listen {

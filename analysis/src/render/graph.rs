@@ -49,12 +49,17 @@ text.c0, text.c1, text.c2, text.c3, text.c4, text.c5, text.c6, text.c7, text.bad
 .tip { fill: var(--own) }
 .arrow { fill: none; stroke: var(--own) } .takes { stroke-width: 1.4; stroke-opacity: 0.75 }
 .ends { stroke-width: 1.2; stroke-opacity: 0.5; stroke-dasharray: 5 3 }
-.calls { stroke-width: 1.2; stroke-opacity: 0.7; stroke-dasharray: 1 3 }";
+.calls { stroke-width: 1.2; stroke-opacity: 0.7; stroke-dasharray: 1 3 }
+.lit > rect { stroke: var(--good); stroke-width: 2.5 } .count { font-weight: bold }
+.path.arrow { stroke-width: 3.5; stroke-opacity: 1 } text.path { font-weight: bold; text-decoration: underline }";
 
 /// A line of a box.
+#[derive(Default)]
 struct BoxLine {
     text: String,
     colour: String,
+    /// Places where its failures begin.
+    places: Vec<String>,
 }
 
 /// A box with a title, a note and lines.
@@ -63,6 +68,8 @@ struct GraphBox {
     note: String,
     lines: Vec<BoxLine>,
     y: usize,
+    /// Source, first and last line of its function.
+    range: String,
 }
 
 impl GraphBox {
@@ -86,6 +93,8 @@ impl GraphBox {
 /// A layer of boxes.
 struct Layer {
     heading: &'static str,
+    /// Word for its boxes in the picture.
+    word: &'static str,
     boxes: Vec<GraphBox>,
     /// Heading above the boxes from a place on.
     second: Option<(usize, &'static str)>,
@@ -94,9 +103,9 @@ struct Layer {
 }
 
 impl Layer {
-    fn new(heading: &'static str, boxes: Vec<GraphBox>) -> Layer {
+    fn new(heading: &'static str, word: &'static str, boxes: Vec<GraphBox>) -> Layer {
         let width = boxes.iter().map(GraphBox::width).max().unwrap_or(0);
-        Layer { heading, boxes, second: None, x: 0, width: width.max(heading.len() * 9) }
+        Layer { heading, word, boxes, second: None, x: 0, width: width.max(heading.len() * 9) }
     }
 
     /// Puts the boxes below each other.
@@ -128,6 +137,8 @@ struct GraphArrow {
 struct FailureSources {
     functions: Vec<(String, Vec<String>)>,
     colours: BTreeMap<String, usize>,
+    /// Places where the failures of each function and cause begin.
+    begins: BTreeMap<(String, String), Vec<String>>,
 }
 
 impl FailureSources {
@@ -145,12 +156,15 @@ impl FailureSources {
         }
         let mut functions: Vec<(String, Vec<String>)> = Vec::new();
         let mut colours = BTreeMap::new();
-        for ((_, function), causes) in found {
+        let mut begins: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
+        for ((origin, function), causes) in found {
             let place = functions.iter().position(|(known, _)| known == function).unwrap_or_else(|| {
                 functions.push((function.to_string(), Vec::new()));
                 functions.len() - 1
             });
             for cause in causes {
+                let key = (function.to_string(), cause.to_string());
+                begins.entry(key).or_default().push(origin.to_string());
                 let next = colours.len() % COLOURS;
                 colours.entry(cause.to_string()).or_insert(next);
                 if !functions[place].1.iter().any(|known| known == cause) {
@@ -158,7 +172,7 @@ impl FailureSources {
                 }
             }
         }
-        FailureSources { functions, colours }
+        FailureSources { functions, colours, begins }
     }
 
     fn colour(&self, cause: &str) -> String {
@@ -179,16 +193,27 @@ impl FailureSources {
         places
     }
 
-    fn layer(&self) -> Layer {
-        let line = |cause: &String| BoxLine { text: cause.clone(), colour: self.colour(cause) };
+    fn layer(&self, table: &FailureTable) -> Layer {
+        let line = |name: &String, cause: &String| BoxLine {
+            text: cause.clone(),
+            colour: self.colour(cause),
+            places: self.begins.get(&(name.clone(), cause.clone())).cloned().unwrap_or_default(),
+        };
         let one = |(name, causes): &(String, Vec<String>)| GraphBox {
             title: name.clone(),
             note: String::new(),
-            lines: causes.iter().map(line).collect(),
+            lines: causes.iter().map(|cause| line(name, cause)).collect(),
             y: 0,
+            range: range_of(table, name),
         };
-        Layer::new("can fail", self.functions.iter().map(one).collect())
+        Layer::new("can fail", "source", self.functions.iter().map(one).collect())
     }
+}
+
+/// Returns the source, the first and the last line of a function, or an empty text if it is not one.
+fn range_of(table: &FailureTable, name: &str) -> String {
+    let function = table.functions.iter().find(|row| row.name == name);
+    function.map_or(String::new(), |row| format!("{}:{}:{}", row.place.source, row.place.line, row.last_line))
 }
 
 /// Returns the answer of a clause in a few words.
@@ -217,7 +242,8 @@ fn clauses(table: &FailureTable, sources: &FailureSources) -> (Layer, Vec<GraphA
     for clause in table.clauses.iter().filter(|clause| !clause.causes.is_empty()) {
         let place = boxes.iter().position(|one| one.title == clause.function).unwrap_or_else(|| {
             let title = clause.function.clone();
-            boxes.push(GraphBox { title, note: String::new(), lines: Vec::new(), y: 0 });
+            let range = range_of(table, &title);
+            boxes.push(GraphBox { title, note: String::new(), lines: Vec::new(), y: 0, range });
             boxes.len() - 1
         });
         let line = boxes[place].lines.len();
@@ -226,14 +252,14 @@ fn clauses(table: &FailureTable, sources: &FailureSources) -> (Layer, Vec<GraphA
             true => sources.colour(&clause.wanted),
             false => PLAIN.to_string(),
         };
-        boxes[place].lines.push(BoxLine { text, colour });
+        boxes[place].lines.push(BoxLine { text, colour, ..BoxLine::default() });
         for row in &clause.causes {
             for from in sources.places(row) {
                 arrows.push(GraphArrow { from, to: (place, line), colour: sources.colour(&row.cause) });
             }
         }
     }
-    (Layer::new("recovers (↑: if in vain, outward)", boxes), arrows)
+    (Layer::new("recovers (↑: if in vain, outward)", "form", boxes), arrows)
 }
 
 /// Returns the layer of tasks, and the arrows of failures that end them.
@@ -259,16 +285,16 @@ fn tasks(table: &FailureTable, sources: &FailureSources) -> (Layer, Vec<GraphArr
             for from in sources.places(row) {
                 arrows.push(GraphArrow { from, to, colour: ENDS.into() });
             }
-            lines.push(BoxLine { text: row.cause.clone(), colour: ENDS.into() });
+            lines.push(BoxLine { text: row.cause.clone(), colour: ENDS.into(), ..BoxLine::default() });
         }
         let (text, colour) = match task.causes.is_empty() {
             true => ("no failure ends it", GOOD),
             false => (end_of(task), ENDS),
         };
-        lines.push(BoxLine { text: cut(text), colour: colour.into() });
-        boxes.push(GraphBox { title: task.name.clone(), note, lines, y: 0 });
+        lines.push(BoxLine { text: cut(text), colour: colour.into(), ..BoxLine::default() });
+        boxes.push(GraphBox { title: task.name.clone(), note, lines, y: 0, range: String::new() });
     }
-    (Layer::new("tasks", boxes), arrows)
+    (Layer::new("tasks", "task", boxes), arrows)
 }
 
 /// Adds the goals below the clauses. Returns the arrows from their methods to the functions of the clauses.
@@ -285,13 +311,13 @@ fn goals(table: &FailureTable, clauses: &mut Layer) -> Vec<GraphArrow> {
                 }
             }
             let text = cut(&format!("{}: {}", method.test, method.calls.join(", ")));
-            lines.push(BoxLine { text, colour: PLAIN.into() });
+            lines.push(BoxLine { text, colour: PLAIN.into(), ..BoxLine::default() });
         }
         let note = match goal.pursued_in.is_empty() {
             true => String::new(),
             false => cut(&format!("in {}", goal.pursued_in.join(", "))),
         };
-        clauses.boxes.push(GraphBox { title: goal.title.clone(), note, lines, y: 0 });
+        clauses.boxes.push(GraphBox { title: goal.title.clone(), note, lines, y: 0, range: String::new() });
     }
     if !table.goals.is_empty() {
         clauses.second = Some((first, "goals and their methods"));
@@ -318,7 +344,7 @@ fn order(sources: &mut FailureSources, arrows: &[GraphArrow], clauses: &Layer) {
 }
 
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 fn draw_heading(svg: &mut String, x: usize, y: usize, heading: &str) {
@@ -334,6 +360,15 @@ fn draw_layer(svg: &mut String, layer: &Layer) {
             draw_heading(svg, x, y - GAP - 6, heading);
         }
         let (width, height) = (layer.width, one.height());
+        // The monitor finds boxes and lines by these attributes.
+        let is_goal = layer.second.is_some_and(|(first, _)| place >= first);
+        let word = if is_goal { "goal" } else { layer.word };
+        _ = writeln!(
+            svg,
+            "<g class=\"{word}\" data-name=\"{}\" data-range=\"{}\">",
+            escaped(&one.title),
+            escaped(&one.range)
+        );
         _ = writeln!(svg, "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"4\"/>");
         let title = escaped(&one.title);
         _ = writeln!(svg, "<text class=\"title\" x=\"{}\" y=\"{}\">{title}</text>", x + 8, y + 16);
@@ -347,11 +382,21 @@ fn draw_layer(svg: &mut String, layer: &Layer) {
             );
             at += LINE;
         }
-        for line in &one.lines {
+        for (number, line) in one.lines.iter().enumerate() {
             let text = escaped(&line.text);
-            _ = writeln!(svg, "<text class=\"{}\" x=\"{}\" y=\"{at}\">{text}</text>", line.colour, x + 8);
+            let begins = match line.places.is_empty() {
+                true => String::new(),
+                false => format!(" data-begins=\"{}\"", escaped(&line.places.join(" "))),
+            };
+            _ = writeln!(
+                svg,
+                "<text class=\"{}\" data-line=\"{word}.{place}.{number}\"{begins} x=\"{}\" y=\"{at}\">{text}</text>",
+                line.colour,
+                x + 8
+            );
             at += LINE;
         }
+        svg.push_str("</g>\n");
     }
 }
 
@@ -370,8 +415,9 @@ fn draw_arrows(svg: &mut String, arrows: &[GraphArrow], from: &Layer, to: &Layer
         let first = x + bend;
         _ = writeln!(
             svg,
-            "<path class=\"arrow {class} {colour}\" d=\"M{x} {y} C{first} {y} {second} {end_y} {end} {end_y}\"/>\
+            "<path class=\"arrow {class} {colour}\" data-from=\"{}.{}.{}\" data-to=\"{}.{}.{}\" d=\"M{x} {y} C{first} {y} {second} {end_y} {end} {end_y}\"/>\
              <path class=\"tip {colour}\" d=\"{tip}\"/>",
+            from.word, arrow.from.0, arrow.from.1, to.word, arrow.to.0, arrow.to.1
         );
     }
 }
@@ -382,7 +428,7 @@ pub(super) fn render(table: &FailureTable, title: &str) -> String {
     let (mut middle, arrows) = clauses(table, &sources);
     middle.place(0);
     order(&mut sources, &arrows, &middle);
-    let mut left = sources.layer();
+    let mut left = sources.layer(table);
     let (mut middle, taken) = clauses(table, &sources);
     let (mut right, ends) = tasks(table, &sources);
     let methods = goals(table, &mut middle);

@@ -25,13 +25,17 @@
 //! ```
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use esl::module_path::ModulePath;
+use esl::program::{Source, compile_with_core};
+use esl_analysis::render::render_graph;
+use esl_analysis::{AnalysisOptions, analyze};
 use esl_command::{USAGE, complain, say_error};
 #[cfg(unix)]
 use esl_operate::service::{ServiceManager, WatchedRun};
-use esl_operate::{ServedPlaces, ServedRun, parse_address};
+use esl_operate::{MissionPicture, ServedPlaces, ServedRun, parse_address};
 use esl_vm::vm::Vm;
 
 /// Options by which a run can be operated from outside.
@@ -63,13 +67,14 @@ pub struct OperateOptions {
 }
 
 impl OperateOptions {
-    fn places(&self) -> ServedPlaces {
+    fn places(&self, mission: Option<MissionPicture>) -> ServedPlaces {
         ServedPlaces {
             metrics: self.metrics,
             listen: self.listen.clone(),
             monitor: self.monitor,
             secrets: self.secrets.clone(),
             identity: self.certificate.clone().zip(self.key.clone()),
+            mission,
         }
     }
 
@@ -78,7 +83,7 @@ impl OperateOptions {
     /// # Errors
     /// The exit status, after a message.
     pub fn prepare(&self, machine: &mut Vm) -> Result<(), u8> {
-        self.places().prepare(machine).map_err(|error| {
+        self.places(None).prepare(machine).map_err(|error| {
             complain(error);
             USAGE
         })
@@ -90,11 +95,40 @@ impl OperateOptions {
     /// # Errors
     /// The exit status, after a message.
     pub fn begin(&self, machine: &mut Vm, program: &str) -> Result<ServedRun, u8> {
-        self.places().begin(machine, program, &mut |line| say_error!("{line}")).map_err(|error| {
+        self.begin_with(machine, program, None)
+    }
+
+    /// Begins to serve as [`begin`](Self::begin) does, with a picture of the program for the monitor.
+    ///
+    /// # Errors
+    /// The exit status, after a message.
+    pub fn begin_with(
+        &self,
+        machine: &mut Vm,
+        program: &str,
+        mission: Option<MissionPicture>,
+    ) -> Result<ServedRun, u8> {
+        self.places(mission).begin(machine, program, &mut |line| say_error!("{line}")).map_err(|error| {
             complain(error);
             USAGE
         })
     }
+}
+
+/// Returns the picture of a program in a source file: its failures, clauses, tasks and goals.
+pub fn mission_of(file: &Path, path: &ModulePath) -> MissionPicture {
+    let (file, path) = (file.to_path_buf(), path.clone());
+    MissionPicture::new(move || {
+        let text = std::fs::read_to_string(&file).ok()?;
+        let name = file.display().to_string();
+        let mut compiled = compile_with_core(&[Source::new(name.clone(), text)], &path);
+        let cores = std::mem::take(&mut compiled.core);
+        if compiled.has_errors() {
+            return None;
+        }
+        let (table, _) = analyze(cores, &compiled.sources, &AnalysisOptions::default());
+        Some(render_graph(&table, &name))
+    })
 }
 
 /// Tells the service manager of the system, if the command was started by one that waits for it, that the

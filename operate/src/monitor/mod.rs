@@ -24,16 +24,16 @@ use http_body_util::{BodyExt, Channel, Limited};
 use hyper::header::{CONTENT_SECURITY_POLICY, HeaderValue, REFERRER_POLICY};
 use hyper::{Request, Response, StatusCode};
 use serde_json::{Value, json};
-use tokio::sync::{Notify, watch};
+use tokio::sync::{Notify, OnceCell, watch};
 
-use super::RunEnd;
 use super::attach::datum::{boolean, integer, string};
 use super::http::{self, HttpBody, plain, with};
 use super::lobby::{Lobby, LobbyVisit};
 use super::refusal::OperatorRefusal;
 use super::scope::RunScope;
 use super::secrets::{OperatorRole, Secrets};
-use model::{RunModel, ViewerView};
+use super::{MissionPicture, RunEnd};
+use model::{MissionView, RunModel, ViewerView};
 use pictures::PictureBook;
 use request::{Admitted, MonitorCommand, MonitorRequest, admit, parse};
 
@@ -59,6 +59,8 @@ struct MonitorState {
     model: Mutex<RunModel>,
     views: Mutex<BTreeMap<String, ViewerView>>,
     pictures: PictureBook,
+    /// The picture of the program, and what draws it.
+    mission: (Option<MissionPicture>, OnceCell<Option<String>>),
     /// Notified when a viewer comes.
     coming: Notify,
     /// Changes with each survey.
@@ -103,6 +105,7 @@ pub(super) fn serve(
     scope: RunScope,
     secrets: Secrets,
     program: String,
+    mission: Option<MissionPicture>,
 ) -> Result<MonitorHandle, NoEventLoop> {
     let is_secured = identity.is_some();
     let monitor = Arc::new(MonitorState {
@@ -112,6 +115,7 @@ pub(super) fn serve(
         model: Mutex::default(),
         views: Mutex::default(),
         pictures: PictureBook::default(),
+        mission: (mission, OnceCell::new()),
         coming: Notify::new(),
         updates: watch::Sender::new(0),
         program,
@@ -155,6 +159,16 @@ async fn survey_for_viewers(monitor: Arc<MonitorState>) {
         monitor.updates.send_modify(|count| *count += 1);
         tokio::time::sleep(PERIOD).await;
     }
+}
+
+/// Returns the picture of the program, which is drawn at the first request.
+async fn drawn(monitor: &MonitorState) -> Option<&String> {
+    let (picture, known) = &monitor.mission;
+    let draw = async || {
+        let picture = picture.clone()?;
+        tokio::task::spawn_blocking(move || (picture.0)()).await.ok().flatten()
+    };
+    known.get_or_init(draw).await.as_ref()
 }
 
 async fn answer(
@@ -314,6 +328,15 @@ async fn message(watching: &Watching, role: OperatorRole, asks_more: bool) -> Op
         let model = lock(&monitor.model);
         (model.message(&view), model.latest_failure(), model.is_paused())
     };
+    if view.mission != MissionView::None {
+        let picture = drawn(monitor).await;
+        let is_wanted = view.mission == MissionView::All;
+        message["mission"] = json!({
+            "tasks": lock(&monitor.model).activity(),
+            "svg": picture.filter(|_| is_wanted),
+            "drawn": picture.is_some(),
+        });
+    }
     if asks_more && view.has_pictures && !is_paused {
         message["pictures"] = monitor.pictures.latest(&monitor.scope.sender()).await;
     }

@@ -16,6 +16,21 @@ const FAILURES: usize = 200;
 /// Most rows that a viewer is shown at a time.
 pub(super) const ROWS: usize = 120;
 
+/// Most tasks whose activity the picture of the program shows.
+const ACTIVE: usize = 500;
+
+/// The parts of the picture of the program that a viewer wants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum MissionView {
+    /// None.
+    #[default]
+    None,
+    /// Names and places of tasks, for a picture that it has.
+    Live,
+    /// The picture, too.
+    All,
+}
+
 /// The view that a viewer has chosen.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ViewerView {
@@ -33,6 +48,8 @@ pub(super) struct ViewerView {
     pub(super) facts_from: usize,
     /// Whether pictures are shown.
     pub(super) has_pictures: bool,
+    /// Wanted parts of the picture of the program.
+    pub(super) mission: MissionView,
     /// Number of the latest failure that was shown.
     pub(super) failure: u64,
     /// How often a viewer of this name has come.
@@ -192,6 +209,12 @@ impl RunModel {
             || row.standing.name() == text
             || text == "cycle" && self.cycle.contains(&row.number)
             || row.number.to_string() == text
+    }
+
+    /// Returns the names, states and places of the tasks.
+    pub(super) fn activity(&self) -> Vec<Value> {
+        let rows = self.tasks.values().take(ACTIVE);
+        rows.map(|row| json!([row.name, row.standing.name(), row.place])).collect()
     }
 
     /// Returns what a viewer is told.

@@ -6,7 +6,7 @@ use hyper::http::request::Parts;
 use hyper::{Method, StatusCode};
 use serde_json::Value;
 
-use super::model::{ROWS, ViewerView};
+use super::model::{MissionView, ROWS, ViewerView};
 use crate::attach::codes_of;
 use crate::refusal::OperatorRefusal;
 use crate::secrets::{OperatorRole, Secrets};
@@ -120,6 +120,11 @@ pub(super) fn parse(role: OperatorRole, is_view: bool, body: &[u8]) -> Result<Mo
             relation: text("relation"),
             facts_from: number("facts_from"),
             has_pictures: value["pictures"] == true,
+            mission: match value["mission"].as_str() {
+                Some("all") => MissionView::All,
+                Some("live") => MissionView::Live,
+                _ => MissionView::None,
+            },
             ..ViewerView::default()
         };
         return Ok(MonitorRequest::View { viewer: text("viewer"), view });

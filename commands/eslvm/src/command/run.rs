@@ -16,7 +16,7 @@ use super::options::{ClockChoice, MachineOptions, Stats, TierChoice};
 use super::program::{complain_of_signal, program};
 use super::realtime::react_in_time;
 use crate::mcap::{McapRecording, RunFileOptions};
-use crate::operate::{OperateOptions, tell_manager};
+use crate::operate::{OperateOptions, mission_of, tell_manager};
 use crate::profile::{INTERVAL, Profile, ProfileUnit};
 use crate::signal::{SignalTarget, end_on_signal};
 
@@ -127,7 +127,7 @@ pub(crate) fn run(
     if let (Some(_), Some(reason)) = (tier, &machine.tier().1.refused) {
         say_error!("eslvm: --tier has no effect: {reason}");
     }
-    let served = operate.begin(&mut machine, &name)?;
+    let served = operate.begin_with(&mut machine, &name, Some(mission_of(file, path)))?;
     if let Some((recorder, path_of_record)) = &recording {
         let folders = path.folders().iter().map(|folder| folder.to_string_lossy().into_owned()).collect();
         let schedule = schedule.cloned();

@@ -205,6 +205,16 @@ fn the_page_is_readable_at_any_width_and_keeps_the_end_of_the_run() {
     browser.until("document.querySelectorAll('#t-failures .card').length === 1");
     browser.until("document.querySelector('.card').textContent.includes(':WHEEL-STUCK')");
     browser.until("document.querySelector('.card').textContent.includes('5 times since')");
+    // The picture of the program has its own style, which the policy of the page permits.
+    browser.press("6");
+    browser.until(
+        "drawing !== null && drawing.querySelector('.source[data-name=slew] .count').textContent === '  ×5'",
+    );
+    browser.until("drawing.querySelector('.task.lit[data-name=charging-of-batteries]') !== null");
+    browser.until("getComputedStyle(drawing.querySelector('.task.lit > rect')).strokeWidth === '2.5px'");
+    browser.until("drawing.querySelector('.task.lit[data-name=main]') !== null");
+    browser.until("drawing.querySelectorAll('.path.arrow.takes').length === 1 && view.mission === 'live'");
+    browser.press("2");
     browser.until("/^[0-9]+ s more$|^[0-9]+:[0-9]+ more$/.test(document.getElementById('row-' + last.rows.find(row => row.count === 200).n).children[3].textContent)");
     for width in [1400, 420] {
         browser.resize(width);
@@ -225,6 +235,9 @@ fn the_page_is_readable_at_any_width_and_keeps_the_end_of_the_run() {
         .until("$('alarm').textContent.startsWith('The run has ended with status 1: a failure or an abort')");
     browser.until("$('alarm').textContent.includes('A failure of cause :WHEEL-STUCK with 9, LEFT.')");
     browser.until("$('t-failures').textContent.includes('it has ended the task')");
+    browser.press("6");
+    browser.until("drawing.querySelectorAll('.path.arrow.ends').length === 1");
+    browser.press("2");
     // The calls of the library are shown if they are wanted.
     browser.until("!$('library').checked && !$('t-failures').textContent.includes('ESL::%')");
     browser.value("$('library').focus(), $('library').click(), true");

@@ -93,7 +93,7 @@ fn the_tutorial_shows_what_a_reader_sees() {
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).expect("the folder can be made");
     let pages = pages();
-    assert_eq!(pages.len(), 8);
+    assert_eq!(pages.len(), 9);
     let mut faults = Vec::new();
     for page in &pages {
         let markdown = fs::read_to_string(page).expect("the page can be read");
