@@ -1,6 +1,6 @@
 //! The playground: what it says of programs, and its page in a browser. The page is left out without Chromium
 //! or without the module for it, which this command builds:
-//! `cargo build -p esl-playground --target wasm32-unknown-unknown`.
+//! `cargo build -p esl-playground --target wasm32-unknown-unknown --target-dir target/playground`.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
@@ -104,7 +104,7 @@ fn serve(module: Vec<u8>) -> String {
 #[test]
 fn the_page_runs_programs_and_stops_them() {
     let target = Path::new(crate::ESLVM).ancestors().nth(2).expect("the target folder");
-    let module = target.join("wasm32-unknown-unknown/debug/esl_playground.wasm");
+    let module = target.join("playground/wasm32-unknown-unknown/debug/esl_playground.wasm");
     let Ok(module) = std::fs::read(module) else {
         return say_left_out("the module of the playground is not built");
     };
