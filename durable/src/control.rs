@@ -58,6 +58,10 @@ struct ControlState {
     is_ending: AtomicBool,
     /// Whether the run is a copy, which comes back at the end of its journal, or when an upgrade was tried.
     is_copy: AtomicBool,
+    /// Whether the copy goes on behind its journal, as if it had been the run.
+    is_rehearsal: AtomicBool,
+    /// Whether the copy answers calls behind its journal.
+    is_asked: AtomicBool,
     /// Whether snapshots are taken, so that a pause waits for one.
     has_snapshots: AtomicBool,
     /// Whether the snapshot before a pause was taken, or is left out.
@@ -124,6 +128,26 @@ impl DurableControl {
     /// Returns whether the run is a copy.
     pub(crate) fn is_copy(&self) -> bool {
         self.0.is_copy.load(Ordering::Relaxed)
+    }
+
+    /// Has a copy go on behind its journal as if it were the run.
+    pub(crate) fn set_rehearsal(&self) {
+        self.0.is_rehearsal.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns whether the copy goes on behind its journal.
+    pub(crate) fn is_rehearsal(&self) -> bool {
+        self.0.is_rehearsal.load(Ordering::Relaxed)
+    }
+
+    /// Has a copy at the end of its journal answer calls, in place of coming back.
+    pub(crate) fn set_asked(&self) {
+        self.0.is_asked.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns whether the copy comes back at the end of its journal.
+    pub(crate) fn comes_back(&self) -> bool {
+        self.is_copy() && !self.is_rehearsal() && !self.0.is_asked.load(Ordering::Relaxed)
     }
 
     /// Has pauses wait for a snapshot.

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use esl::engine::Handle;
-use esl::program::{self, Compiled, Source};
+use esl::engine::{Handle, HostDefinition};
+use esl::module_path::ModulePath;
+use esl::program::{self, Compiled, Modules, Source};
 use esl_compiler::diagnostic::Sources;
 use esl_host::{HostRows, Inbox, RealHost};
 use esl_replay::RunSetup;
@@ -21,6 +22,10 @@ pub struct DurableSettings {
     pub config: Config,
     /// The outside; by default the system, without rights. Its clock is set.
     pub host: Option<RealHost>,
+    /// Functions with lambda lists, beside those that are declared as rows: the same ones each time.
+    pub functions: Vec<HostDefinition>,
+    /// Where `require` finds modules.
+    pub path: ModulePath,
     /// Whether the run makes the definitions of another version of its program.
     pub upgrades: bool,
 }
@@ -36,11 +41,12 @@ pub enum DurableEnding {
 
 /// A machine whose run is durable, for programs in Rust.
 ///
-/// The program is a text. Rust code gives it functions, which are declared as rows, and reaches it by
-/// [`DurableEngine::handle`]: everything goes through the journal. The effect of each row decides about a
-/// call that the end of a process has interrupted: an [idempotent](esl_host::HostRow::idempotent) one is made
-/// again with the same identity (`HostOperation::action`), by which the host finds its own data about the
-/// call; the others fail with `:interrupted-by-restart`.
+/// The program is a text. Rust code gives it functions, as rows or as [`HostDefinition`]s, and reaches it by
+/// [`DurableEngine::handle`]: everything goes through the journal. The effect of each function decides about
+/// a call that the end of a process has interrupted: an [idempotent](esl_host::HostRow::idempotent) one is
+/// made again with the same identity (`HostOperation::action`); the others fail with
+/// `:interrupted-by-restart`. An operation that has [saved](esl_host::HostOperation::save) bytes of its own is
+/// begun again too, and restores them there.
 pub struct DurableEngine {
     run: DurableRun,
     machine: Vm,
@@ -65,7 +71,9 @@ impl DurableEngine {
         let mut run = DurableRun::open(folder, settings.durable)?;
         let host = settings.host.unwrap_or_else(|| RealHost::new(Vec::new())).with_elapsed(run.elapsed());
         let rows = rows(&esl_host::Host::inbox(&host));
-        let (given, texts) = compile(sources, &rows)?;
+        let functions = settings.functions;
+        let variables = HostDefinition::variables(&functions).map_err(DurableError::Machine)?;
+        let (given, texts) = compile(sources, &rows, &functions, &settings.path)?;
         let program = run.choose_program(&given, &texts, settings.upgrades)?;
         let config = run.config(settings.config.clone());
         let machine = program::machine(config, Box::new(run.host(host)));
@@ -73,7 +81,20 @@ impl DurableEngine {
         // That part of the library makes upgrades.
         program::load_operators(&mut machine).map_err(DurableError::Machine)?;
         rows.into_iter().for_each(|row| machine.add_host_row(row));
-        run.begin(&program, &RunSetup { config: settings.config, ..RunSetup::default() }, &machine)?;
+        for (function, variables) in functions.into_iter().zip(variables) {
+            function.give_to(&mut machine, variables);
+        }
+        // A run that goes on looks for modules where it did before.
+        let given = || settings.path.folders().iter().map(|folder| folder.to_string_lossy().into_owned());
+        let (folders, program_file) = match run.found() {
+            Some(found) => (found.folders.clone(), found.program_file.clone()),
+            None => (given().collect(), settings.path.program_file()),
+        };
+        // A copy of the run takes the same steps.
+        program::set_module_folders(&mut machine, &folders).map_err(DurableError::Machine)?;
+        program::set_program_file(&mut machine, &program_file).map_err(DurableError::Machine)?;
+        let setup = RunSetup { config: settings.config, folders, program_file, ..RunSetup::default() };
+        run.begin(&program, &setup, &machine)?;
         machine.set_tier(Tier::Auto);
         let ended = run.ended();
         let main = match run.restore(&mut machine)? {
@@ -123,8 +144,13 @@ impl DurableEngine {
 }
 
 /// Compiles a program after the definitions of the functions of the host.
-fn compile(sources: &[Source], rows: &HostRows) -> Result<(program::Program, Sources), DurableError> {
-    let definitions: String = rows
+fn compile(
+    sources: &[Source],
+    rows: &HostRows,
+    functions: &[HostDefinition],
+    path: &ModulePath,
+) -> Result<(program::Program, Sources), DurableError> {
+    let mut definitions: String = rows
         .iter()
         .map(|row| {
             let documentation = row.documentation.replace('\\', "\\\\").replace('"', "\\\"");
@@ -133,9 +159,13 @@ fn compile(sources: &[Source], rows: &HostRows) -> Result<(program::Program, Sou
             format!("(esl::%define-host-function {} ({parameters}) \"{documentation}\" {waits})\n", row.name)
         })
         .collect();
+    for function in functions {
+        definitions += &function.form();
+        definitions.push('\n');
+    }
     let mut all = vec![Source::new("functions of the host", definitions)];
     all.extend(sources.iter().cloned());
-    let Compiled { program, diagnostics, sources, .. } = program::compile(&all);
+    let Compiled { program, diagnostics, sources, .. } = program::compile_with(&all, path, Modules::Inside);
     let refused = || DurableError::Machine(esl::Error::DoesNotCompile(diagnostics));
     Ok((program.ok_or_else(refused)?, sources))
 }

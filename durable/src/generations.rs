@@ -93,26 +93,11 @@ pub(crate) fn find(folder: &Path) -> Result<Option<FoundJournals>, DurableError>
                 }
             },
         };
-        let mut journal = match read_journal(folder, base) {
+        let mut journal = match joined(folder, base, last) {
             // The first process was killed before it had begun the run.
             Err(DurableError::Journal(RecordedError::NoBeginning)) if last == 0 => return Ok(None),
             journal => journal?,
         };
-        for number in base + 1..=last {
-            let next = read_journal(folder, number)?;
-            if !journal.append(next) {
-                let problem = if journal.recorded.torn > 0 {
-                    "its end is missing, and the next journal is there, as after a loss of power without \
-                     `--durability power`"
-                } else {
-                    "the next journal does not begin at its end"
-                };
-                return Err(DurableError::Journal(RecordedError::Damaged {
-                    offset: journal.length,
-                    problem,
-                }));
-            }
-        }
         let mut snapshot_bytes = 0;
         if let (Some(start), Some((snapshot, bytes))) = (&journal.recorded.start, snapshot) {
             let generation = start.generation.clone();
@@ -122,6 +107,37 @@ pub(crate) fn find(folder: &Path) -> Result<Option<FoundJournals>, DurableError>
         return Ok(Some(FoundJournals { journal, base, last, oldest, snapshot_bytes, warnings }));
     }
     Err(DurableError::Journal(refused.unwrap_or(RecordedError::NoSnapshot)))
+}
+
+/// Returns the number of the last generation in a folder.
+///
+/// # Errors
+/// [`DurableError`].
+pub(crate) fn last(folder: &Path) -> Result<u64, DurableError> {
+    let numbers = numbers(folder).map_err(|error| DurableError::Folder(folder.into(), error))?;
+    numbers.last().copied().ok_or_else(|| DurableError::NoRun(folder.into()))
+}
+
+/// Reads the journals of these generations as one.
+///
+/// # Errors
+/// [`DurableError`].
+pub(crate) fn joined(folder: &Path, first: u64, last: u64) -> Result<RunJournal, DurableError> {
+    let mut journal = read_journal(folder, first)?;
+    for number in first + 1..=last {
+        let next = read_journal(folder, number)?;
+        if !journal.append(next) {
+            let problem = if journal.recorded.torn > 0 {
+                "its end is missing, and the next journal is there, as after a loss of power without \
+                 `--durability power`"
+            } else {
+                "the next journal does not begin at its end"
+            };
+            let offset = journal.length;
+            return Err(DurableError::Journal(RecordedError::Damaged { offset, problem }));
+        }
+    }
+    Ok(journal)
 }
 
 fn read_journal(folder: &Path, number: u64) -> Result<RunJournal, DurableError> {

@@ -18,7 +18,7 @@ use esl_vm::vm::Vm;
 use super::control::DurableControl;
 
 /// The numbers of operations that are begun again are above this one.
-const REPEATED: u64 = 1 << 62;
+pub(crate) const REPEATED: u64 = 1 << 62;
 /// Calls from which on the list is searched for those that are over.
 const SOME: usize = 64;
 /// Pauses before a call that has failed is tried again: the first, and the longest.

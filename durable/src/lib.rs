@@ -51,9 +51,11 @@ mod kill_place;
 mod lasting;
 mod log;
 mod look;
+mod rehearsal;
 mod rest;
 mod resume;
 mod snapshots;
+mod standing;
 mod upgrade;
 
 use std::path::Path;
@@ -62,7 +64,7 @@ use esl::program::Program;
 use esl_bytecode::module::Module;
 use esl_host::Host;
 use esl_replay::{
-    Beginning, JournalLife, JournalUpgrade, JournalWriter, RecordedError, RunJournal, RunSetup,
+    Beginning, JournalLife, JournalUpgrade, JournalWriter, OpenCall, RecordedError, RunJournal, RunSetup,
 };
 use esl_vm::heap::range_start;
 use esl_vm::task::TaskId;
@@ -78,16 +80,18 @@ pub use folder::RunFolder;
 pub use fork::{RunFork, fork};
 pub use host::DurableHost;
 pub use log::LogFigures;
-pub use look::{DurableState, look};
+pub use look::{DurableState, RunPatch, look};
+pub use rehearsal::{Rehearsal, rehearse};
 pub use rest::RunRest;
 pub use snapshots::{SnapshotEvery, SnapshotFigures};
 pub use upgrade::UpgradeReport;
 
 use generations::FoundJournals;
 use lasting::LastingCalls;
-use log::{JournalLog, Standing};
+use log::JournalLog;
 use resume::{Resumption, chance, wall_clock};
 use snapshots::SnapshotTaker;
+use standing::Standing;
 use upgrade::Upgrade;
 
 /// The events that a durable run survives.
@@ -225,14 +229,14 @@ impl DurableRun {
                 found: None,
             });
         };
-        let RunJournal { recorded, lives, upgrades, length, time, generation: _, writer } = journal;
+        let RunJournal { recorded, lives, upgrades, saved, length, time, generation: _, writer } = journal;
         if !recorded.beginning.is_of_this_machine() {
             return Err(DurableError::Journal(RecordedError::OtherMachine));
         }
         let torn = (recorded.torn > 0).then_some(length as u64);
         let last = lives.last().copied().unwrap_or_default();
         let resumption = Resumption::new(&last, time, wall_clock(), options.downtime, options.hosted);
-        let standing = Standing { number, base, oldest, ..Standing::after(&recorded, &upgrades) };
+        let standing = Standing { number, base, oldest, ..Standing::after(&recorded, &upgrades, saved) };
         let log = JournalLog::new(disk, writer, length as u64, options.durability, standing);
         let taker = SnapshotTaker::new(options.snapshots, log.clone(), control.clone(), lasting.clone());
         let snapshot = recorded.start.as_ref().and_then(|start| start.snapshot.as_ref());
@@ -272,7 +276,9 @@ impl DurableRun {
         if let Some(found) = self.found.as_ref().filter(|_| !self.control.is_copy()) {
             let ended = interruption::ended_operations(&found.recorded.records);
             let open = generation.open.iter().filter(|call| !ended.contains(&call.number));
-            for call in open.filter(|call| interruption::is_repeated(call)) {
+            let is_repeated =
+                |call: &&OpenCall| interruption::is_repeated(call, self.log.has_saved(call.number));
+            for call in open.filter(is_repeated) {
                 machine.begin_again(call.number, &call.name, &call.arguments, call.action);
             }
         }

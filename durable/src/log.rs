@@ -4,22 +4,26 @@
 //! demands. After an error nothing is written any more, and every effect is refused: a system that has
 //! dropped data does not write them at a second try.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::HashSet;
 use std::io;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-use esl_host::{ActionId, Inbox, Incoming, News, NotedRecord, Record, Recorder, RunCheck};
+use esl_host::{ActionId, Inbox, NotedRecord, Record, Recorder, RunCheck, StateKeeper};
 use esl_replay::{
-    Beginning, JournalGeneration, JournalLife, JournalUpgrade, JournalWriter, OpenCall, Recorded,
-    RecordedEnd, StoredCall, journal_beginning, journal_end, journal_life,
+    Beginning, JournalGeneration, JournalLife, JournalWriter, OpenCall, RecordedEnd, StoredCall,
+    journal_beginning, journal_end, journal_life, journal_saved,
 };
 use esl_vm::heap::HeapMemory;
 
 use super::disk::{Disk, SnapshotWriting};
+use super::lasting::REPEATED;
+use super::standing::Standing;
 use super::{Durability, DurableError};
 
 /// Bytes of records that wait at most.
 const BUFFER: usize = 64 << 10;
+/// Bytes that an operation can save at most.
+const MOST_SAVED: usize = 64 << 20;
 
 /// The state of a journal that is being written.
 struct LogWriting {
@@ -46,67 +50,6 @@ struct LogWriting {
     /// Rung when there is an error, so that the machine comes back.
     inbox: Option<Inbox>,
     figures: LogFigures,
-}
-
-/// The beginning of the next generation of the journal.
-#[derive(Default)]
-pub(crate) struct Standing {
-    /// The beginning of the run, with its present program.
-    pub(crate) beginning: Option<Beginning>,
-    /// Number of the generation that is written, of that from which the run can go on, and of the oldest.
-    pub(crate) number: u64,
-    pub(crate) base: u64,
-    pub(crate) oldest: u64,
-    /// Number of records, of effects and of upgrades of the run so far.
-    pub(crate) records: u64,
-    pub(crate) effects: u64,
-    pub(crate) upgrades: u64,
-    pub(crate) senders: u64,
-    pub(crate) asked: u64,
-    pub(crate) arguments: Option<Vec<String>>,
-    /// The calls under way, and some that are over.
-    pub(crate) open: BTreeMap<u64, OpenCall>,
-}
-
-impl Standing {
-    /// Returns where a run stands after its journal.
-    pub(crate) fn after(recorded: &Recorded, upgrades: &[JournalUpgrade]) -> Standing {
-        let mut standing = Standing { beginning: Some(recorded.beginning.clone()), ..Standing::default() };
-        if let Some(start) = &recorded.start {
-            let generation = &start.generation;
-            standing.records = generation.records;
-            standing.effects = generation.effects;
-            standing.upgrades = generation.upgrades;
-            standing.senders = generation.senders;
-            standing.asked = generation.asked;
-            standing.arguments.clone_from(&generation.arguments);
-            standing.open = generation.open.iter().map(|call| (call.number, call.clone())).collect();
-        }
-        recorded.records.iter().for_each(|noted| standing.hear(&noted.record));
-        standing.upgrades += upgrades.len() as u64;
-        if let (Some(beginning), Some(upgrade)) = (&mut standing.beginning, upgrades.last()) {
-            beginning.program.clone_from(&upgrade.program);
-        }
-        standing
-    }
-
-    /// Takes the next record of the run into account.
-    fn hear(&mut self, record: &Record) {
-        self.records += 1;
-        match record {
-            Record::Intended(_) => self.effects += 1,
-            Record::Arguments(arguments) => self.arguments = Some(arguments.clone()),
-            Record::Received((_, contents)) => contents.iter().for_each(|incoming| match incoming {
-                Incoming::SenderCame => self.senders += 1,
-                Incoming::SenderLeft => self.senders = self.senders.saturating_sub(1),
-                Incoming::Question { number, .. } => self.asked = self.asked.max(*number),
-                Incoming::Operation { news: News::Progress(_), .. } => {}
-                Incoming::Operation { number, .. } => _ = self.open.remove(number),
-                _ => {}
-            }),
-            _ => {}
-        }
-    }
 }
 
 /// Figures of a journal that is being written.
@@ -217,6 +160,7 @@ impl JournalLog {
             return Err(io::Error::other("the journal before it cannot be written"));
         };
         standing.open.retain(|number, _| open.contains(number));
+        standing.saved.retain(|number, _| open.contains(number));
         let mut generation = JournalGeneration::default();
         generation.number = standing.number + 1;
         generation.life = life;
@@ -228,6 +172,7 @@ impl JournalLog {
         generation.not_due = not_due;
         generation.arguments.clone_from(&standing.arguments);
         generation.open = standing.open.values().cloned().collect();
+        generation.saved = standing.saved.iter().map(|(&number, state)| (number, state.clone())).collect();
         generation.lasting = lasting;
         let (number, records) = (generation.number, generation.records);
         let contents = writer.begin_generation(beginning, generation);
@@ -331,6 +276,16 @@ impl JournalLog {
         writing.sync();
     }
 
+    /// Returns whether an operation has saved a state.
+    pub(crate) fn has_saved(&self, operation: u64) -> bool {
+        self.lock().standing.saved.contains_key(&operation)
+    }
+
+    /// Returns the keeper of the states of operations. It does not keep the journal open.
+    pub(crate) fn state_keeper(&self) -> impl StateKeeper + use<> {
+        LogKeeper(Arc::downgrade(&self.0))
+    }
+
     /// Returns whether calls of the outside are under way.
     pub(crate) fn has_open_calls(&self) -> bool {
         !self.lock().standing.open.is_empty()
@@ -403,7 +358,45 @@ impl JournalLog {
     }
 }
 
+/// Keeps the states of operations in the journal: not among the records, since the program does not see
+/// them, and so a replay need not.
+struct LogKeeper(Weak<Mutex<LogWriting>>);
+
+impl LogKeeper {
+    fn log(&self) -> Option<JournalLog> {
+        self.0.upgrade().map(JournalLog)
+    }
+}
+
+impl StateKeeper for LogKeeper {
+    fn save(&self, operation: u64, state: &[u8]) -> bool {
+        // A call that lasts is made again as a whole.
+        operation > REPEATED || self.log().is_some_and(|log| log.lock().save(operation, state))
+    }
+
+    fn restore(&self, operation: u64) -> Option<Vec<u8>> {
+        self.log()?.lock().standing.saved.get(&operation).cloned()
+    }
+}
+
 impl LogWriting {
+    /// Keeps the state of an operation under way. Records that wait stay, since the state does not depend on
+    /// them: the intent of the operation was written before.
+    fn save(&mut self, operation: u64, state: &[u8]) -> bool {
+        if !self.standing.open.contains_key(&operation) || state.len() > MOST_SAVED {
+            return false;
+        }
+        let bytes = journal_saved(operation, state, self.mark());
+        self.append(&bytes);
+        if self.durability == Durability::Power {
+            self.sync();
+        }
+        if self.error.is_none() {
+            self.standing.saved.insert(operation, state.to_vec());
+        }
+        self.error.is_none()
+    }
+
     fn is_safe(&self) -> bool {
         self.error.is_none() && self.life.is_some()
     }

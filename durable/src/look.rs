@@ -4,10 +4,15 @@ use std::fs;
 use std::path::Path;
 use std::time::SystemTime;
 
+use esl::program;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
 use esl_host::{Record, Survey, SurveyRequest};
 use esl_replay::{JournalLife, Recorded, Replayed, Rerun, RunJournal};
 use esl_vm::vm::Vm;
 
+use super::control::DurableControl;
 use super::folder::RunFolder;
 use super::generations::{self, FoundJournals};
 use super::resume::{Resumption, wall_clock};
@@ -48,6 +53,8 @@ pub struct DurableState {
     /// Ticks of all tasks.
     pub ticks: u64,
     machine: LookedMachine,
+    /// The control of the copy that is inspected.
+    control: DurableControl,
     /// The folder is locked while it is inspected.
     _folder: RunFolder,
 }
@@ -56,6 +63,55 @@ impl DurableState {
     /// Returns tasks, relations and facts where the journal ends.
     pub fn survey(&mut self, request: &SurveyRequest) -> Survey {
         self.machine.get().survey(request)
+    }
+}
+
+/// A patch that an operator has made in a run, and that is in force.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunPatch {
+    /// Number of its definitions.
+    pub definitions: usize,
+    /// The kinds of what it has changed, in lower case, and the names.
+    pub changes: Vec<(String, String)>,
+}
+
+impl RunPatch {
+    /// Reads an element of the library's list of patches.
+    fn of(datum: &Datum) -> Option<RunPatch> {
+        let parts = datum.as_list()?;
+        let (count, rows) = parts.split_first()?;
+        let DatumKind::Integer(count) = count.kind() else { return None };
+        let row = |row: &&Datum| {
+            let row = row.as_list()?;
+            let kind = row.first()?.to_string().trim_start_matches(':').to_lowercase();
+            Some((kind, row.get(1)?.to_string()))
+        };
+        let changes = rows.iter().filter_map(row).collect();
+        Some(RunPatch { definitions: usize::try_from(count).ok()?, changes })
+    }
+}
+
+impl DurableState {
+    /// Returns the patches of operators that are in force where the journal ends, newest first. A run that has
+    /// ended has none.
+    ///
+    /// # Errors
+    /// [`DurableError::Machine`].
+    pub fn patches(&mut self) -> Result<Vec<RunPatch>, DurableError> {
+        let LookedMachine::Open(machine) = &mut self.machine else { return Ok(Vec::new()) };
+        if !program::has_operators(machine) {
+            return Ok(Vec::new());
+        }
+        self.control.set_asked();
+        let none = || DurableError::Machine(esl::Error::NoMemory("the patches"));
+        let read = machine.callee_named("symbol-value").ok_or_else(none)?;
+        let variable = Datum::symbol(Symbol::esl("*%PATCHES*"), Span::default());
+        let variable = machine.import(&variable).map_err(|_| none())?;
+        let values = machine.call_without_budget(read, &[variable], u64::MAX);
+        let values = values.map_err(|error| DurableError::Machine(error.into()))?;
+        let Some(&list) = values.first() else { return Ok(Vec::new()) };
+        let list = machine.export(list).map_err(|_| none())?;
+        Ok(list.as_list().unwrap_or_default().into_iter().filter_map(RunPatch::of).collect())
     }
 }
 
@@ -106,12 +162,14 @@ pub fn look(path: &Path) -> Result<DurableState, DurableError> {
         })
         .sum::<u64>();
     let RunJournal { recorded, lives, upgrades, time, .. } = journal;
+    let mut control = DurableControl::default();
     let mut machine = match recorded.end {
         Some(_) => LookedMachine::Ended(Box::new(run_ended(&recorded)?)),
         None => {
             let last = lives.last().copied().unwrap_or_default();
             let resumption = Resumption::new(&last, time, wall_clock(), Downtime::Stops, None);
             let copy = DurableRun::copy_of(&recorded, resumption, None);
+            control = copy.control();
             LookedMachine::Open(Box::new(copy.run_to_end_of_journal()?))
         }
     };
@@ -139,6 +197,7 @@ pub fn look(path: &Path) -> Result<DurableState, DurableError> {
         written,
         ticks: machine.get().check().ticks,
         machine,
+        control,
         _folder: folder,
     })
 }

@@ -54,6 +54,11 @@ impl Resumption {
         Resumption { number: last.number + 1, wall, downtime: gap, elapsed, chance: chance(), is_told }
     }
 
+    /// Has the program not be told of it.
+    pub(crate) fn untold(self) -> Resumption {
+        Resumption { is_told: false, ..self }
+    }
+
     /// Returns whether the program is told of it: not where it was only asleep.
     pub(crate) fn is_told(&self) -> bool {
         self.is_told

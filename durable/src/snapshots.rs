@@ -6,6 +6,7 @@
 //! Guarantees: at each moment the files in the folder are enough to go on. A snapshot that cannot be taken or
 //! written is left out: the journals cover it.
 
+use std::str::FromStr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -30,6 +31,24 @@ pub enum SnapshotEvery {
     Bytes(u64),
     /// Never.
     Never,
+}
+
+/// Reads a time with its unit, such as `60s`, a size of the journal, such as `64M`, or `never`.
+impl FromStr for SnapshotEvery {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<SnapshotEvery, &'static str> {
+        if text == "never" {
+            return Ok(SnapshotEvery::Never);
+        }
+        if let Ok(time) = humantime::parse_duration(text) {
+            return Ok(SnapshotEvery::Time(time));
+        }
+        match esl::size::parse_size(text) {
+            Ok(bytes) => Ok(SnapshotEvery::Bytes(bytes as u64)),
+            Err(_) => Err("expected a time such as `60s`, a size of the journal such as `64M`, or `never`"),
+        }
+    }
 }
 
 /// The snapshots that this process has taken of a run.

@@ -25,15 +25,16 @@ use super::changes::{ProgramChanges, changes};
 use super::control::DurableControl;
 use super::disk::NowhereDisk;
 use super::lasting::LastingCalls;
-use super::log::{JournalLog, Standing};
+use super::log::JournalLog;
 use super::resume::Resumption;
 use super::snapshots::{SnapshotEvery, SnapshotTaker};
+use super::standing::Standing;
 use super::{Durability, DurableError, DurableRun, FoundRun};
 
 /// Ticks between two looks of a trial.
-const STRETCH: u64 = 100_000;
+pub(super) const STRETCH: u64 = 100_000;
 /// Ticks that a trial takes at most behind the end of the journal.
-const PATIENCE: u64 = 2_000_000_000;
+pub(super) const PATIENCE: u64 = 2_000_000_000;
 
 /// The effects of an upgrade.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -202,6 +203,21 @@ impl DurableRun {
         program: &Program,
         changes: &ProgramChanges,
     ) -> Result<UpgradeReport, DurableError> {
+        let upgrade = self.upgrade_to(program, changes)?;
+        let found = self.found.as_ref().ok_or(DurableError::NoBeginning)?;
+        let copy = DurableRun::copy_of(&found.recorded, found.resumption, Some(upgrade));
+        copy.run_upgrade(&mut copy.copied_machine()?)
+    }
+
+    /// Returns an upgrade of the run.
+    ///
+    /// # Errors
+    /// [`DurableError::NotUpgraded`], if it cannot be upgraded.
+    pub(super) fn upgrade_to(
+        &self,
+        program: &Program,
+        changes: &ProgramChanges,
+    ) -> Result<Upgrade, DurableError> {
         let not_upgraded = |reason: &str| DurableError::NotUpgraded(reason.into());
         let found = self.found.as_ref().ok_or_else(|| not_upgraded("the run has not begun"))?;
         if found.recorded.end.is_some() {
@@ -214,15 +230,12 @@ impl DurableRun {
             return Err(not_upgraded("an upgrade needs the source of the program, which is compiled"));
         }
         let program = program.to_bytes().map_err(DurableError::Program)?;
-        let upgrade = Upgrade { program, before: found.current().to_vec(), changes: changes.clone() };
-        let copy = DurableRun::copy_of(&found.recorded, found.resumption, Some(upgrade));
-        copy.run_trial()
+        Ok(Upgrade { program, before: found.current().to_vec(), changes: changes.clone() })
     }
 
-    /// Runs to the end of the upgrade.
-    fn run_trial(&self) -> Result<UpgradeReport, DurableError> {
+    /// Runs the machine of a copy to the end of the upgrade.
+    pub(super) fn run_upgrade(&self, machine: &mut Vm) -> Result<UpgradeReport, DurableError> {
         let not_upgraded = |reason: &str| Err(DurableError::NotUpgraded(reason.into()));
-        let mut machine = self.copied_machine()?;
         let mut left = PATIENCE;
         loop {
             let outcome = machine.run(STRETCH);
@@ -288,12 +301,17 @@ impl DurableRun {
 
     /// Makes the machine of a copy, and begins its program.
     fn copied_machine(&self) -> Result<Vm, DurableError> {
-        let Some(found) = &self.found else {
-            return Err(DurableError::NotUpgraded("the run has not begun".into()));
-        };
         // An outside in memory, so that not even an interrupted write of a file is completed.
         let mut outside = VirtualHost::new();
         outside.advance(self.elapsed());
+        self.copied_machine_on(outside)
+    }
+
+    /// Makes the machine of a copy with this outside, and begins its program.
+    pub(super) fn copied_machine_on(&self, outside: impl Host + Send + 'static) -> Result<Vm, DurableError> {
+        let Some(found) = &self.found else {
+            return Err(DurableError::NotUpgraded("the run has not begun".into()));
+        };
         let host = self.host(outside);
         let first = read_program(&found.recorded.beginning.program)?;
         let beginning = &found.recorded.beginning;

@@ -479,3 +479,51 @@ fn figures_of_steps() {
     }
     drop(std::fs::remove_dir_all(folder));
 }
+
+/// The states that an operation has found and saved.
+type Saved = Arc<Mutex<Vec<(Option<Vec<u8>>, bool, bool)>>>;
+
+/// Runs a program whose operation saves two states, the second of which the disk may refuse.
+fn saving_life(disk: &MemoryDisk, is_refused: bool, saved: &Saved) -> Result<u8, DurableError> {
+    let options = DurableOptions { downtime: Downtime::Stops, ..DurableOptions::default() };
+    let run = DurableRun::on(Box::new(disk.clone()), options)?;
+    let host = RealHost::new(Vec::new()).with_virtual_time().with_elapsed(run.elapsed());
+    let mut machine = program::machine(Config::DEFAULT, Box::new(run.host(host))).expect("there is room");
+    let (disk, saved, held) = (disk.clone(), saved.clone(), Mutex::new(None));
+    let hold = HostFunction::Operation(Box::new(move |operation: HostOperation| {
+        let found = operation.restore();
+        let first = operation.save(b"one");
+        if is_refused {
+            disk.fail_after(0, Doing::Nothing);
+        }
+        let second = operation.save(b"two");
+        saved.lock().unwrap_or_else(PoisonError::into_inner).push((found, first, second));
+        if second {
+            operation.complete(Vec::new());
+        } else {
+            // It stays under way until the process ends.
+            *held.lock().unwrap_or_else(PoisonError::into_inner) = Some(operation);
+        }
+    }));
+    machine.add_function_with("HOLD", hold, &[], CallEffect::Once);
+    let program = compiled("(esl::%define-host-function hold () \"Holds.\" t) (hold)");
+    run.begin(&program, &RunSetup::default(), &machine)?;
+    let main = program::begin(&mut machine, &program).expect("there is room");
+    let outcome = machine.run(u64::MAX);
+    run.check()?;
+    run.control().begin_end();
+    let summary = program::finish(&mut machine, main, outcome);
+    run.end(&machine, summary.ended.exit_status())?;
+    Ok(summary.ended.exit_status())
+}
+
+#[test]
+fn a_state_that_cannot_be_kept_is_refused() {
+    let (disk, saved) = (MemoryDisk::default(), Saved::default());
+    let error = saving_life(&disk, true, &saved).expect_err("the disk fails");
+    assert!(matches!(error, DurableError::NotWritten(_)), "{error}");
+    disk.mend();
+    assert_eq!(saving_life(&disk, false, &saved).expect("it goes on"), 0);
+    let saved = saved.lock().unwrap_or_else(PoisonError::into_inner);
+    assert_eq!(*saved, [(None, true, false), (Some(b"one".to_vec()), true, true)]);
+}

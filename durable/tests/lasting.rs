@@ -3,10 +3,13 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
 
 use esl::host::{HostFailure, HostHandle, HostObject, HostRows, Inbox};
-use esl::program::Source;
-use esl_durable::{DurableEnding, DurableEngine, DurableOptions, DurableSettings, SnapshotEvery};
+use esl::program::{Source, compile};
+use esl_durable::{
+    DurableEnding, DurableEngine, DurableOptions, DurableSettings, Rehearsal, SnapshotEvery, rehearse,
+};
 
 const PROGRAM: &str = "
 (define-input order)
@@ -122,4 +125,40 @@ fn calls_that_last_are_made_again_until_they_are_closed() {
         assert_eq!(process(&folder, snapshots, &[1, 3]), gone, "{snapshots:?}");
         std::fs::remove_dir_all(folder).expect("it is ours");
     }
+}
+
+/// Has another version of the program take the last stretch of the run of a folder.
+fn rehearsed(folder: &Path, text: &str, back: Duration) -> Rehearsal {
+    let form = |row: &esl::host::HostRow| {
+        let (name, parameters, text) = (row.name, row.parameters.join(" "), row.documentation);
+        format!("(esl::%define-host-function {name} ({parameters}) \"{text}\" NIL)\n")
+    };
+    let forms: String = rows(&Inbox::new(), channel().0).iter().map(form).collect();
+    let sources = [Source::new("functions of the host", forms), Source::new("doors.esl", text)];
+    let compiled = compile(&sources);
+    let program = compiled.program.expect("it compiles");
+    rehearse(folder, &program, &compiled.sources, back).expect("it runs").expect("it is another program")
+}
+
+#[test]
+fn another_program_takes_the_past_of_a_run() {
+    let folder = std::env::temp_dir().join(format!("esl-rehearsed-{}", std::process::id()));
+    let knock = "knock at front of kitchen";
+    let heard = process(&folder, SnapshotEvery::Never, &[1, 1, 2]);
+    assert_eq!(heard[3..], [knock, knock, "shut"]);
+    // It announces itself, and leaves the door open.
+    let with = |reaction: &str| PROGRAM.replace("(2 (shut *front*) (tell \"shut\"))", reaction);
+    let text = with("(2 (handler-case (tell \"open\") (failure () nil)))");
+    let whole = rehearsed(&folder, &text, Duration::from_secs(3600));
+    assert!(whole.upgrade.is_none() && whole.ended.is_none() && whole.errors.is_empty(), "{whole:?}");
+    assert_eq!((whole.arrivals, whole.alike, whole.others, whole.left_out), (3, 5, 1, 2), "{whole:?}");
+    assert_eq!(whole.named[0].1, "(TELL \"open\")");
+    let failing = rehearsed(&folder, &with("(2 (tell \"open\"))"), Duration::from_secs(3600));
+    assert!(failing.ended == Some(1) && failing.errors.contains(":NOT-IN-THIS-WORLD"), "{failing:?}");
+    let again = process(&folder, SnapshotEvery::Never, &[1]);
+    assert_eq!(again, ["open side", "INTERRUPTED-BY-RESTART"]);
+    let late = rehearsed(&folder, &text, Duration::from_millis(1));
+    let upgrade = late.upgrade.expect("the run has begun before");
+    assert!(upgrade.left_out.len() == 1 && upgrade.definitions == 0, "{upgrade:?}");
+    std::fs::remove_dir_all(folder).expect("it is ours");
 }

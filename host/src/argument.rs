@@ -10,7 +10,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::function::Handler;
-use super::{ActionId, HostFailure, HostOperation, Inbox, Sender};
+use super::{ActionId, HostFailure, HostOperation, Inbox, OperationState, Sender};
 
 /// The arguments of one call, which are read from left to right.
 pub struct ArgumentReader<'a> {
@@ -97,6 +97,16 @@ impl FromCall for CallAction {
 
     fn from_call(call: &mut ArgumentReader<'_>) -> Result<CallAction, HostFailure> {
         Ok(CallAction(call.operation().and_then(HostOperation::action)))
+    }
+}
+
+/// The state of the operation that the call is. A function that returns at once has none: it keeps nothing.
+impl FromCall for OperationState {
+    const COUNT: usize = 0;
+
+    fn from_call(call: &mut ArgumentReader<'_>) -> Result<OperationState, HostFailure> {
+        let none = || OperationState::new(0, call.inbox());
+        Ok(call.operation().map_or_else(none, HostOperation::state))
     }
 }
 

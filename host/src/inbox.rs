@@ -8,7 +8,7 @@
 //! then has no effect.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::task::Waker;
 use std::time::{Duration, Instant};
 
@@ -18,7 +18,7 @@ use super::external_clock::{ClockStep, ExternalClock};
 use super::question::{Asking, Question};
 use super::sender::Admission;
 use super::survey::Inspections;
-use super::{News, ProcessSignal, Wake};
+use super::{News, ProcessSignal, StateKeeper, Wake};
 
 /// Something that reaches a run from outside.
 #[derive(Clone, Debug)]
@@ -98,6 +98,8 @@ struct InboxState {
     handled: AtomicU32,
     /// The task to wake when the inbox is rung.
     waker: Mutex<Option<Waker>>,
+    /// The keeper of the states of operations, if the run is durable.
+    keeper: OnceLock<Box<dyn StateKeeper>>,
 }
 
 /// The inbox of one machine, shared by its senders and the host that takes the contents out.
@@ -186,6 +188,17 @@ impl Inbox {
     /// Returns whether the program handles a signal of the process, so that it does not end the run.
     pub fn is_handled(&self, signal: ProcessSignal) -> bool {
         signal.can_be_handled() && self.0.handled.load(Ordering::Relaxed) >> signal.number() & 1 != 0
+    }
+
+    /// Names the keeper of the states of operations, once.
+    #[doc(hidden)]
+    pub fn set_state_keeper(&self, keeper: impl StateKeeper + 'static) {
+        // A second host of the same inbox is one of the same run.
+        drop(self.0.keeper.set(Box::new(keeper)));
+    }
+
+    pub(super) fn state_keeper(&self) -> Option<&dyn StateKeeper> {
+        self.0.keeper.get().map(|keeper| &**keeper)
     }
 
     /// Returns whether the machine should look.

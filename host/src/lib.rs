@@ -12,6 +12,7 @@
 //! | `input` | [`HostInput`]: an input that a driver signals, which waits for room |
 //! | `sender` | [`Sender`]: signals of inputs, with a limit on the unread ones |
 //! | `operation` | [`HostOperation`]: work of the outside for a task, and its end |
+//! | `saved` | [`OperationState`]: bytes of an operation that outlive the process of a durable run |
 //! | `question` | [`Question`]: calls, evaluations and commands for a run, and their answers |
 //! | `survey` | [`Inspection`]: reading the state of a run between two turns, without an effect on it |
 //! | `task_tree` | the tree of the tasks in what was seen |
@@ -51,6 +52,7 @@ mod real_output;
 mod record;
 mod replay;
 mod rights;
+mod saved;
 mod sender;
 mod shared;
 mod signal;
@@ -79,6 +81,7 @@ pub use real_files::request_of_files;
 pub use record::{Intent, NotedRecord, QuestionHash, Record, Recorder, Recording, RecordingHost};
 pub use replay::{Divergence, ReplayHost};
 pub use rights::{Permit, Right, Rights};
+pub use saved::{OperationState, StateKeeper};
 pub use sender::{SendError, Sender, SenderInput};
 pub use signal::ProcessSignal;
 pub use survey::{

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_bytecode::datum::Datum;
 
-use super::{ActionId, Inbox, Incoming};
+use super::{ActionId, Inbox, Incoming, OperationState};
 
 /// A failure as it crosses the border between a program and its host, in either direction.
 #[derive(Clone, Debug)]
@@ -134,6 +134,22 @@ impl HostOperation {
     /// the call once.
     pub fn action(&self) -> Option<ActionId> {
         self.action
+    }
+
+    /// Returns its state, which outlives the process of a durable run.
+    pub fn state(&self) -> OperationState {
+        OperationState::new(self.number, &self.inbox)
+    }
+
+    /// Keeps bytes with the state of a durable run: [`OperationState::save`].
+    #[must_use = "bytes that are not safe may be missing in the next process"]
+    pub fn save(&self, state: &[u8]) -> bool {
+        self.state().save(state)
+    }
+
+    /// Returns the bytes that were saved last, by this process or an earlier one.
+    pub fn restore(&self) -> Option<Vec<u8>> {
+        self.state().restore()
     }
 
     /// Returns its number, unique in the machine.

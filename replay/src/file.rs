@@ -41,7 +41,7 @@ use super::snapshot::RunSnapshot;
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
 /// The version of the format that this library reads and writes.
-pub const FORMAT: u32 = 7;
+pub const FORMAT: u32 = 8;
 
 /// Length of what is before the content of a frame.
 pub(super) const FRAME: usize = 11;
@@ -61,6 +61,7 @@ pub(super) mod kind {
     pub(crate) const MARKED_COMPRESSED: u8 = 7;
     pub(crate) const UPGRADE: u8 = 8;
     pub(crate) const GENERATION: u8 = 9;
+    pub(crate) const SAVED: u8 = 10;
 }
 
 /// A function of the embedder's, as a replay has to know it.

@@ -70,6 +70,8 @@ pub struct JournalGeneration {
     pub arguments: Option<Vec<String>>,
     /// The calls under way, by number.
     pub open: Vec<OpenCall>,
+    /// The states that operations under way have saved, by their numbers.
+    pub saved: Vec<(u64, Vec<u8>)>,
     /// The calls that last, in the order in which they were made.
     pub lasting: Vec<StoredCall>,
     pub(super) before: Before,
@@ -94,6 +96,7 @@ impl JournalGeneration {
             not_due,
             arguments,
             open,
+            saved,
             lasting,
             before,
         } = self;
@@ -109,6 +112,10 @@ impl JournalGeneration {
             out.list(&call.arguments, |out, argument| out.datum(argument));
             out.byte(call.effect as u8);
             out.0.extend_from_slice(&call.action.0.to_le_bytes());
+        });
+        out.list(saved, |out, (number, state)| {
+            out.number(*number);
+            out.bytes(state);
         });
         out.list(lasting, |out, call| {
             out.text(&call.name);
@@ -149,6 +156,7 @@ impl JournalGeneration {
                 action: ActionId(u128::from_le_bytes(from.array()?)),
             })
         })?;
+        let saved = from.list(|from| Some((from.number()?, from.bytes()?.to_vec())))?;
         let lasting = from.list(|from| {
             let name = from.text()?.into();
             let arguments = from.list(|from| match from.byte()? {
@@ -172,6 +180,7 @@ impl JournalGeneration {
             not_due,
             arguments: arguments.pop(),
             open,
+            saved,
             lasting,
             before,
         })
@@ -216,6 +225,7 @@ mod tests {
             JournalGeneration { number: 1, life, records: half as u64, ..Default::default() };
         generation.arguments = Some(vec!["one".into(), String::new()]);
         generation.open = vec![call];
+        generation.saved = vec![(4, vec![0, 255])];
         let mut second = writer.begin_generation(&beginning, generation.clone());
         let length = second.len();
         records[half..].iter().for_each(|noted| _ = writer.add(noted));
@@ -226,8 +236,8 @@ mod tests {
         let start = next.recorded.start.clone().expect("it begins in the middle of the run");
         assert_eq!(text(&next.recorded.records), text(&records[half..]));
         let told = |generation: &JournalGeneration| {
-            let JournalGeneration { number, life, records, arguments, open, .. } = generation;
-            format!("{number} {life:?} {records} {arguments:?} {open:?}")
+            let JournalGeneration { number, life, records, arguments, open, saved, .. } = generation;
+            format!("{number} {life:?} {records} {arguments:?} {open:?} {saved:?}")
         };
         assert_eq!(told(&start.generation), told(&generation));
         let mut whole = journal(&first);

@@ -1,6 +1,6 @@
 //! The journal of a durable run: a recording that several processes write, one after the other.
 //!
-//! It is a file as `file` describes it, with frames of five further kinds:
+//! It is a file as `file` describes it, with frames of six further kinds:
 //!
 //! ```text
 //! 5 life                 a process begins to write, or pauses the run: mark, and the fields of `JournalLife`
@@ -8,6 +8,7 @@
 //! 7 the same, compressed by lz4: mark, length of the records, compressed records
 //! 8 upgrade              mark, the program that the run has from here on, and records
 //! 9 generation           mark, and where the journal begins, if not with its run (`generation`)
+//! 10 saved               mark, the number of an operation, and the bytes that it has saved last
 //! ```
 //!
 //! The records of an upgrade have the call that makes the definitions of its program. Both are in one frame,
@@ -21,6 +22,7 @@
 //! if one of its sectors is zero, and no whole frame behind it has a mark beyond it; a torn tail is cut. Any
 //! other bad frame means that the file was changed, and it is refused.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use esl_host::NotedRecord;
@@ -150,6 +152,17 @@ pub fn journal_end(end: &RecordedEnd) -> Vec<u8> {
     end_bytes(end)
 }
 
+/// Returns the frame that says that an operation has saved these bytes.
+pub fn journal_saved(operation: u64, state: &[u8], mark: u64) -> Vec<u8> {
+    let mut out = ByteWriter::default();
+    out.number(mark);
+    out.number(operation);
+    out.bytes(state);
+    let mut bytes = Vec::new();
+    frame(&mut bytes, kind::SAVED, &out.0);
+    bytes
+}
+
 pub(super) fn write_life_fields(out: &mut ByteWriter, life: &JournalLife) {
     out.number(life.number);
     out.byte(u8::from(life.is_pause) + u8::from(life.is_asleep));
@@ -249,13 +262,16 @@ fn is_torn(bytes: &[u8], offset: usize) -> bool {
 /// Returns whether a whole frame behind `offset` was written when everything there was safe.
 fn has_frame_beyond(bytes: &[u8], offset: usize) -> bool {
     (offset + 1..bytes.len()).any(|at| {
-        whole_frame(&bytes[at..]).is_some_and(|(kind, content)| match kind {
-            kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED | kind::UPGRADE | kind::GENERATION => {
-                ByteReader(content).number().is_some_and(|mark| mark > offset as u64)
-            }
-            _ => true,
+        whole_frame(&bytes[at..]).is_some_and(|(kind, content)| {
+            !has_mark(kind) || ByteReader(content).number().is_some_and(|mark| mark > offset as u64)
         })
     })
+}
+
+/// Returns whether frames of a kind begin with a mark.
+fn has_mark(kind: u8) -> bool {
+    use kind::{GENERATION, LIFE, MARKED, MARKED_COMPRESSED, SAVED, UPGRADE};
+    matches!(kind, LIFE | MARKED | MARKED_COMPRESSED | UPGRADE | GENERATION | SAVED)
 }
 
 /// A program that a run was upgraded to.
@@ -278,6 +294,8 @@ pub struct RunJournal {
     pub lives: Vec<JournalLife>,
     /// The programs that the run has been upgraded to.
     pub upgrades: Vec<JournalUpgrade>,
+    /// The states that operations have saved last, by their numbers. Some of these may be over.
+    pub saved: BTreeMap<u64, Vec<u8>>,
     /// Bytes of the file that are good: all but a torn tail.
     pub length: usize,
     /// Time of the program's clock at the last record that has one.
@@ -295,7 +313,8 @@ impl RunJournal {
     /// [`RecordedError`].
     pub fn read(bytes: &[u8]) -> Result<RunJournal, RecordedError> {
         let (reading, length) = read_frames(bytes, u64::MAX)?;
-        let JournalReading { beginning, records, lives, upgrades, end, before, generation, .. } = reading;
+        let JournalReading { beginning, records, lives, upgrades, saved, end, before, generation, .. } =
+            reading;
         let number = generation.as_ref().map_or(0, |generation| generation.number);
         let start = generation.map(|generation| Arc::new(RunStart { generation, snapshot: None }));
         let beginning = beginning.ok_or(RecordedError::NoBeginning)?;
@@ -304,6 +323,7 @@ impl RunJournal {
             recorded: Recorded { beginning, records: records.into(), end, torn, start },
             lives,
             upgrades,
+            saved,
             length,
             time: before.time(),
             generation: number,
@@ -382,6 +402,8 @@ impl RunJournal {
         let upgrades = next.upgrades.into_iter();
         self.upgrades
             .extend(upgrades.map(|upgrade| JournalUpgrade { records: upgrade.records + offset, ..upgrade }));
+        // Its beginning repeats the states that were saved before.
+        self.saved = next.saved;
         (self.length, self.time, self.writer) = (next.length, next.time, next.writer);
         self.generation = next.generation;
         true
@@ -394,6 +416,7 @@ struct JournalReading {
     records: Vec<NotedRecord>,
     lives: Vec<JournalLife>,
     upgrades: Vec<JournalUpgrade>,
+    saved: BTreeMap<u64, Vec<u8>>,
     end: Option<RecordedEnd>,
     before: Before,
     generation: Option<JournalGeneration>,
@@ -404,9 +427,9 @@ struct JournalReading {
 impl Default for JournalReading {
     fn default() -> JournalReading {
         let (beginning, records, lives, upgrades) = (None, Vec::new(), Vec::new(), Vec::new());
-        let before = Before::default();
+        let (saved, before) = (BTreeMap::new(), Before::default());
         let (end, generation) = (None, None);
-        JournalReading { beginning, records, lives, upgrades, end, before, generation, is_ours: true }
+        JournalReading { beginning, records, lives, upgrades, saved, end, before, generation, is_ours: true }
     }
 }
 
@@ -429,10 +452,7 @@ impl JournalReading {
         let strange = |problem| if is_ours { damaged(problem) } else { RecordedError::OtherMachine };
         let malformed = || strange("the content is not of its kind");
         let mut from = ByteReader(content);
-        if matches!(
-            kind,
-            kind::LIFE | kind::MARKED | kind::MARKED_COMPRESSED | kind::UPGRADE | kind::GENERATION
-        ) {
+        if has_mark(kind) {
             from.number().filter(|&mark| mark <= offset as u64).ok_or_else(malformed)?;
         }
         match kind {
@@ -457,7 +477,13 @@ impl JournalReading {
                 }
                 self.before = generation.before;
                 self.lives.push(generation.life);
+                self.saved = generation.saved.iter().cloned().collect();
                 self.generation = Some(generation);
+            }
+            kind::SAVED => {
+                let operation = from.number().ok_or_else(malformed)?;
+                let state = from.bytes().filter(|_| from.is_empty()).ok_or_else(malformed)?;
+                self.saved.insert(operation, state.to_vec());
             }
             kind::END => self.end = Some(read_end(content).ok_or_else(malformed)?),
             _ => return Err(strange("a frame of an unknown kind")),

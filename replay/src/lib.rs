@@ -58,6 +58,7 @@ pub use file::{Beginning, FORMAT, GivenFunction, MAGIC, Recorded, RecordedEnd, R
 pub use generation::{JournalGeneration, OpenCall, StoredArgument, StoredCall};
 pub use journal::{
     JournalLife, JournalUpgrade, JournalWriter, RunJournal, journal_beginning, journal_end, journal_life,
+    journal_saved,
 };
 pub use pattern::{FactPattern, NotAPattern};
 pub use recorder::FileRecorder;

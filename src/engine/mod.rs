@@ -17,6 +17,7 @@
 //! ```
 
 mod call;
+mod definition;
 mod executor;
 mod function;
 mod handle;
@@ -28,13 +29,9 @@ mod query;
 mod watch;
 
 use std::future::Future;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use esl_bytecode::datum::Datum;
-use esl_bytecode::span::Span;
 use esl_host::{Host, HostRows, Inbox, RealHost};
-use esl_vm::embed::HostFunction;
 use esl_vm::run::CallError;
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
@@ -44,6 +41,7 @@ use crate::error::{Error, NAME_MARKS};
 use crate::program;
 
 pub use call::{Call, Failure};
+pub use definition::HostDefinition;
 pub use esl_vm::observe::{Observer, Seen};
 pub use esl_vm::task::TaskNumber;
 pub use executor::{Executor, HostFuture};
@@ -133,26 +131,13 @@ impl Engine {
         name: &str,
         lambda_list: &str,
         documentation: &str,
-        mut function: F,
+        function: F,
     ) -> Result<(), Error>
     where
         F: FnMut(Call) -> Result<V, Failure> + Send + 'static,
         V: Into<Data>,
     {
-        self.define_by(name, lambda_list, documentation, false, |names| {
-            let mut last = Datum::nil(Span::default());
-            HostFunction::AtOnce(Box::new(move |arguments| {
-                let result = Failure::of_arguments(arguments).and_then(|arguments| {
-                    let call = Call { names: names.clone(), arguments };
-                    let result = catch_unwind(AssertUnwindSafe(|| function(call)));
-                    result.unwrap_or_else(|panic| Err(Failure::of_panic(&*panic)))
-                });
-                match result {
-                    Ok(value) => Ok(value.into().to_datum_again(&mut last)),
-                    Err(failure) => Err(failure.to_host()),
-                }
-            }))
-        })
+        self.add_definition(HostDefinition::at_once(name, lambda_list, documentation, function))
     }
 
     /// Defines a function whose calls are operations, performed by futures. The calling task waits until the
@@ -201,18 +186,12 @@ impl Engine {
         name: &str,
         lambda_list: &str,
         documentation: &str,
-        mut begin: F,
+        begin: F,
     ) -> Result<(), Error>
     where
         F: FnMut(Operation) + Send + 'static,
     {
-        self.define_by(name, lambda_list, documentation, true, |names| {
-            HostFunction::Operation(Box::new(move |operation| {
-                let Some(operation) = Operation::new(operation, names.clone()) else { return };
-                // A panic drops the operation, which is how the program hears of it.
-                drop(catch_unwind(AssertUnwindSafe(|| begin(operation))));
-            }))
-        })
+        self.add_definition(HostDefinition::operation(name, lambda_list, documentation, begin))
     }
 
     /// Has calls of an operation that are left not wait until it has stopped.
@@ -268,17 +247,13 @@ impl Engine {
         self.eval(&format!("(esl:define-exclusive {name} {})", parameter.unwrap_or_default())).map(drop)
     }
 
-    /// Defines a function of the embedder's, which `make` makes for the variables of its lambda list.
-    fn define_by(
-        &mut self,
-        name: &str,
-        lambda_list: &str,
-        documentation: &str,
-        waits: bool,
-        make: impl FnOnce(Arc<[String]>) -> HostFunction,
-    ) -> Result<(), Error> {
-        let names = self.define_name(name, lambda_list, documentation, waits)?;
-        self.machine.add_host_function(&name.to_uppercase(), make(names));
+    /// Defines a function of the embedder's.
+    ///
+    /// # Errors
+    /// As [`Engine::define`].
+    pub fn add_definition(&mut self, definition: HostDefinition) -> Result<(), Error> {
+        let names = self.define_form(definition.name(), &definition.form())?;
+        definition.give_to(&mut self.machine, names);
         Ok(())
     }
 
@@ -290,12 +265,13 @@ impl Engine {
         documentation: &str,
         waits: bool,
     ) -> Result<Arc<[String]>, Error> {
+        self.define_form(name, &definition::form(name, lambda_list, documentation, waits))
+    }
+
+    /// Makes the definition of this name. Returns the variables of its lambda list, in lower case.
+    fn define_form(&mut self, name: &str, form: &str) -> Result<Arc<[String]>, Error> {
         check_name(name)?;
-        let waits = if waits { "T" } else { "NIL" };
-        let documentation = documentation.replace('\\', "\\\\").replace('"', "\\\"");
-        let definition =
-            format!("(esl::%define-host-function {name} {lambda_list} \"{documentation}\" {waits})");
-        let names = self.eval(&definition)?;
+        let names = self.eval(form)?;
         let names = names.as_list().unwrap_or_default().iter();
         Ok(names.map(|name| name.as_str().unwrap_or_default().to_lowercase()).collect())
     }

@@ -53,6 +53,30 @@ impl Operation {
         &self.call
     }
 
+    /// Returns the identity of the call in a durable run, the same in each process that performs it.
+    pub fn action(&self) -> Option<host::ActionId> {
+        self.host.action()
+    }
+
+    /// Returns its state, which outlives the process of a durable run.
+    pub fn state(&self) -> host::OperationState {
+        self.host.state()
+    }
+
+    /// Keeps bytes with the state of a durable run, in place of those before, and returns when they are as
+    /// safe as the run demands. The next process begins an operation that has saved bytes again, whatever
+    /// its effect is, and restores them there. Returns false if they cannot be kept: then the operation does
+    /// not go on. Without a durable run it has no effect, and returns true.
+    #[must_use = "bytes that are not safe may be missing in the next process"]
+    pub fn save(&self, state: &[u8]) -> bool {
+        self.host.save(state)
+    }
+
+    /// Returns the bytes that the operation has saved last, in this process or an earlier one.
+    pub fn restore(&self) -> Option<Vec<u8>> {
+        self.host.restore()
+    }
+
     /// Ends the operation: this is the value of the call.
     pub fn complete<V: Into<Data>>(self, value: V) {
         self.complete_with(&[value.into()]);

@@ -26,6 +26,11 @@ impl<H: Host> DurableHost<H> {
         self.log.commit().then_some(action)
     }
 
+    /// Returns whether arguments have an object that is gone: in a rehearsal, none is.
+    fn is_gone(&self, arguments: &[Datum]) -> bool {
+        has_gone_object(arguments) && !self.control.is_rehearsal()
+    }
+
     /// Makes a call of a function that returns at once.
     pub(super) fn call_outside(
         &mut self,
@@ -33,7 +38,7 @@ impl<H: Host> DurableHost<H> {
         function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
         let stand_in = self.lasting.stand_in(call.arguments);
-        if has_gone_object(stand_in.as_deref().unwrap_or(call.arguments)) {
+        if self.is_gone(stand_in.as_deref().unwrap_or(call.arguments)) {
             let is_done = call.effect.is_done_by_restart();
             let answer = if is_done { Ok(Datum::nil(Span::default())) } else { Err(interrupted(call, None)) };
             return self.live.answer_call(call, answer);
@@ -70,7 +75,7 @@ impl<H: Host> DurableHost<H> {
         };
         self.log.note_open(open_call(call, number, action));
         let stand_in = self.lasting.stand_in(call.arguments);
-        if has_gone_object(stand_in.as_deref().unwrap_or(call.arguments)) {
+        if self.is_gone(stand_in.as_deref().unwrap_or(call.arguments)) {
             return self.inbox.put(Incoming::Operation { number, news: after_restart(call, None) });
         }
         let begin = &mut |given: &[Datum], _| function(stand_in.as_deref().unwrap_or(given), Some(action));

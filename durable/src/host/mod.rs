@@ -16,7 +16,7 @@ use esl_bytecode::datum::Datum;
 use esl_host::{
     ActionId, Awaited, FileAnswer, FileRequest, Host, HostCall, HostError, HostFailure, Inbox, Incoming,
     Input, News, NotedRecord, Output, Permit, ProcessSignal, QuestionHash, Recorder, RecordingHost,
-    RepeatedCall, ReplayHost, Right, Rights, RunCheck, Wake, WriteMode, has_gone_object,
+    RepeatedCall, ReplayHost, Right, Rights, RunCheck, Wake, WriteMode,
 };
 
 use esl_replay::JournalGeneration;
@@ -25,8 +25,7 @@ use super::control::{DurableControl, Resumed};
 use super::error::DurableError;
 use super::file_effect::{FileSize, complete_deletion, complete_request, complete_write, size_of};
 use super::interruption::{
-    after_restart, ended_operations, interrupted, last_question, news_of, open_call, refused,
-    resumed_message, senders,
+    ended_operations, interrupted, last_question, news_of, open_call, refused, resumed_message, senders,
 };
 use super::lasting::LastingCalls;
 use super::log::JournalLog;
@@ -78,8 +77,9 @@ impl<H: Host> DurableHost<H> {
         inbox.number_questions_above(last_question(&records, start.map_or(0, |start| start.asked)));
         let early = (0..lost).map(|_| Incoming::SenderLeft).collect();
         let open = start.map_or(&[][..], |start| &start.open).iter();
-        let open = open.filter(|call| !ended.contains(&call.number)).map(|call| (call.number, news_of(call)));
-        let open = open.collect();
+        let open = open.filter(|call| !ended.contains(&call.number));
+        let open = open.map(|call| (call.number, news_of(call, log.has_saved(call.number)))).collect();
+        inbox.set_state_keeper(log.state_keeper());
         let past = match start {
             Some(_) => ReplayHost::preparing(records),
             None => ReplayHost::new(records),
@@ -130,6 +130,11 @@ impl<H: Host> DurableHost<H> {
             // Those of this process come later.
             first.push(Incoming::Unattended);
             first.push(resumed_message(&life, downtime));
+        }
+        if self.control.is_rehearsal() {
+            // Nothing is interrupted, and nothing gone: the rest of the run comes by the script.
+            self.open.clear();
+            self.early.drain(..self.lost);
         }
         let mut interrupted = usize::from(self.interrupts);
         for (number, news) in std::mem::take(&mut self.open) {
@@ -233,12 +238,12 @@ impl<H: Host> DurableHost<H> {
         if let (Some(intent), Some(number)) = (self.past.expect_intent(call), call.operation)
             && !self.ended.contains(&number)
         {
-            let is_repeated = call.effect.may_be_repeated() && !has_gone_object(call.arguments);
-            if is_repeated {
+            let open = open_call(call, number, intent.action);
+            let news = news_of(&open, self.log.has_saved(number));
+            self.log.note_open(open);
+            if news.is_none() {
                 function(call.arguments, Some(intent.action));
             }
-            let news = (!is_repeated).then(|| after_restart(call, Some(intent.action)));
-            self.log.note_open(open_call(call, number, intent.action));
             self.open.insert(number, news);
         }
         self.ring_at_end();
@@ -435,7 +440,7 @@ impl<H: Host> Host for DurableHost<H> {
             // The signal cuts the end of the run short, if that is where it is.
             return vec![Incoming::Signal(ProcessSignal::Interrupt), Incoming::Stop];
         }
-        if self.control.is_copy() && self.is_live() && self.upgrade.is_none() && self.upgrading.is_none() {
+        if self.control.comes_back() && self.is_live() && self.upgrade.is_none() && self.upgrading.is_none() {
             // The program is not told of a restart.
             return vec![Incoming::Stop];
         }

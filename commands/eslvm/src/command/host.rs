@@ -23,7 +23,7 @@ use esl_durable::{Downtime, Durability, DurableOptions, SnapshotEvery};
 use esl_replay::RunSetup;
 use serde_json::Value;
 
-use super::durable::{DowntimeChoice, DurabilityChoice, snapshot_every};
+use super::durable::{DowntimeChoice, DurabilityChoice};
 use super::options::LibraryOption;
 use crate::rights::RightsOptions;
 use crate::signal::{SignalTarget, end_on_signal_unless};
@@ -45,7 +45,7 @@ pub(crate) struct HostOptions {
     #[arg(long, value_enum, default_value = "counts", value_name = "HOW")]
     downtime: DowntimeChoice,
     /// Store the machine of an agent after so much time or journal, as for `eslvm run --state`
-    #[arg(long, value_name = "WHEN", value_parser = snapshot_every)]
+    #[arg(long, value_name = "WHEN")]
     snapshot_every: Option<SnapshotEvery>,
     #[command(flatten)]
     rights: RightsOptions,

@@ -10,6 +10,7 @@ mod options;
 mod program;
 mod realtime;
 mod run;
+mod state;
 
 use std::path::Path;
 
@@ -22,10 +23,11 @@ use esl_command as command;
 use crate::repl::AttachSecurity;
 use crate::{explore::read_schedule, replay, testing};
 
-use durable::{run_durable, run_state};
+use durable::run_durable;
 use explore::run_explore;
 use options::{ClockChoice, CompilingOptions, Eslvm, EslvmAction};
 use run::{RunReports, run};
+use state::run_state;
 
 /// Lets the process have as many open files and connections as the system allows it.
 #[cfg(unix)]

@@ -9,10 +9,11 @@ use esl::size::{parse_size, parse_stack};
 use esl_vm::value::Value;
 use esl_vm::vm::Tier;
 
-use super::durable::{LookOptions, StateOptions};
+use super::durable::StateOptions;
 #[cfg(unix)]
 use super::host::{AgentsOptions, HostOptions};
 use super::injecting::InjectArguments;
+use super::state::LookOptions;
 use crate::mcap::{McapAction, RunFileOptions};
 use crate::operate::OperateOptions;
 use crate::profile::ProfileUnit;

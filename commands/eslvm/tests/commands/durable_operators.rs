@@ -41,16 +41,23 @@ fn evaluations_of_operators_are_part_of_a_durable_run() {
     running.end();
     let (status, output, errors) = agent.state(&[]);
     assert!(status == Some(0) && output.contains("process 1\n"), "{output}{errors}");
+    let (status, output, errors) = agent.state(&["--patches"]);
+    assert_eq!((status, &*output), (Some(0), "no patches are in force\n"), "{errors}");
 
     // The same machine, whose sessions are others, with a snapshot this time.
     let (mut running, socket) =
         attended(&agent, &["--snapshot-every", "1ms", "--monitor=0", "--metrics", "0"]);
-    let (output, _) =
-        session(&socket, ":signal order 1\n(loop until (= *sum* 35) do (sleep 0.001))\n(list 'then *sum*)\n");
+    let patch = agent.folder.file("patch.esl", "(defun add (number) (incf *sum* (* 10 number)))");
+    let input = format!(
+        ":patch {patch}\n:signal order 1\n(loop until (= *sum* 35) do (sleep 0.001))\n(list 'then *sum*)\n"
+    );
+    let (output, _) = session(&socket, &input);
     assert!(output.contains("(THEN 35)"), "{output}");
     running.wait_for("sum 35");
     running.send("-KILL");
     running.end();
+    let (status, output, errors) = agent.state(&["--patches"]);
+    assert_eq!((status, &*output), (Some(0), "1 definition: function ADD\n"), "{errors}");
 
     // No operator can attach any more, so the run can never go on.
     let (status, _, errors) = agent.run(&[]);
