@@ -95,10 +95,31 @@ typedef enum {
    */
   ESL_DIVERGED = 17,
   /**
+   * The folder of a durable run is in use, damaged, cannot be written, or has the run of another program. The
+   * message says what to do.
+   */
+  ESL_NOT_DURABLE = 18,
+  /**
    * A fault of ESL itself. The message has what to report.
    */
   ESL_PANIC = 15,
 } esl_status;
+
+/**
+ * The effect of making a call of a function twice. It decides about a call that the end of a process has
+ * interrupted.
+ */
+typedef enum {
+  /**
+   * It may not be made twice: the call fails with `:INTERRUPTED-BY-RESTART`, unless its operation has
+   * saved a state.
+   */
+  ESL_ONCE = 0,
+  /**
+   * It only reads, or the second time changes nothing: the next process makes the call again.
+   */
+  ESL_IDEMPOTENT = 1,
+} esl_effect;
 
 /**
  * Where a run stands.
@@ -298,6 +319,12 @@ typedef enum {
 typedef struct esl_config esl_config;
 
 /**
+ * A durable run: a program whose state is kept in a folder. It is made, given its functions, opened with its
+ * program, and run; all of that in the same way in each process. From all threads.
+ */
+typedef struct esl_durable esl_durable;
+
+/**
  * A machine in which programs run. It serves one thread at a time; a call while another one is under way
  * returns `ESL_BUSY`. Other threads reach the run by handles.
  */
@@ -359,6 +386,40 @@ typedef void (*esl_output)(void *user, const char *bytes, size_t length);
 typedef void (*esl_destructor)(void *user);
 
 /**
+ * A function that programs call. It gets the arguments in the order of the lambda list's variables, those
+ * left out as the lambda list says; they live until it returns. It stores its value in `*result`, which the
+ * engine frees, or leaves it null for `NIL`, and returns null; or it returns a failure, which the engine
+ * frees, and the call fails so.
+ *
+ * It is called on the thread of the engine, while no task runs: it returns soon, and neither uses the engine
+ * nor waits for a reply. It must not leave by an exception of C++ or by `longjmp`.
+ */
+typedef esl_failure *(*esl_function)(void *user,
+                                     const esl_value *const *arguments,
+                                     size_t count,
+                                     esl_value **result);
+
+/**
+ * A function that begins an operation, which it hands to a thread or a queue. It is called on the thread of
+ * the engine, and does not wait.
+ */
+typedef void (*esl_operation_function)(void *user, esl_operation *operation);
+
+/**
+ * The end of a durable run in this process.
+ */
+typedef struct {
+  /**
+   * Whether it was paused: the next process goes on.
+   */
+  bool is_paused;
+  /**
+   * The exit status of a run that has ended, now or in an earlier process.
+   */
+  uint8_t exit_status;
+} esl_durable_ending;
+
+/**
  * Where a run stands after a portion of it.
  */
 typedef struct {
@@ -407,20 +468,6 @@ typedef struct {
 } esl_frame;
 
 /**
- * A function that programs call. It gets the arguments in the order of the lambda list's variables, those
- * left out as the lambda list says; they live until it returns. It stores its value in `*result`, which the
- * engine frees, or leaves it null for `NIL`, and returns null; or it returns a failure, which the engine
- * frees, and the call fails so.
- *
- * It is called on the thread of the engine, while no task runs: it returns soon, and neither uses the engine
- * nor waits for a reply. It must not leave by an exception of C++ or by `longjmp`.
- */
-typedef esl_failure *(*esl_function)(void *user,
-                                     const esl_value *const *arguments,
-                                     size_t count,
-                                     esl_value **result);
-
-/**
  * An event of a run. The text lives until the observer returns; it is empty where the event has none.
  */
 typedef struct {
@@ -455,12 +502,6 @@ typedef struct {
  * returns soon, and uses handles only. It must not leave by an exception of C++ or by `longjmp`.
  */
 typedef void (*esl_observer)(void *user, const esl_seen *seen);
-
-/**
- * A function that begins an operation, which it hands to a thread or a queue. It is called on the thread of
- * the engine, and does not wait.
- */
-typedef void (*esl_operation_function)(void *user, esl_operation *operation);
 
 /**
  * A function that is told something about an operation or a reply. It is called on the thread of the engine,
@@ -557,6 +598,157 @@ esl_status esl_config_set_output(const esl_config *config,
  * written, or null.
  */
 esl_status esl_config_allow(const esl_config *config, const char *right, esl_failure **failure);
+
+/**
+ * Creates a durable run whose state is in a folder, which is made if there is none. `config` may be null;
+ * one that records or replays is refused, since a durable run keeps a journal of its own. Limits and seed
+ * are the same in each process.
+ *
+ * The caller sees to it that
+ * `folder` ends with a null character; `config` is settings, or null; `durable` and `failure` are places
+ * that can be written, or null.
+ */
+esl_status esl_durable_new(const char *folder,
+                           const esl_config *config,
+                           esl_durable **durable,
+                           esl_failure **failure);
+
+/**
+ * Frees a durable run; null is ignored. One that was not run to its end goes on in the next process. Returns
+ * `ESL_BUSY`, and frees nothing, while a thread runs it.
+ *
+ * The caller sees to it that
+ * `durable` was not freed before.
+ */
+esl_status esl_durable_free(esl_durable *durable);
+
+/**
+ * Has the run survive loss of power too: it waits for the disk before each effect.
+ *
+ * The caller sees to it that
+ * `durable` is a durable run that is not open; `failure` is a place that can be written, or null.
+ */
+esl_status esl_durable_set_power(const esl_durable *durable,
+                                 bool survives_loss_of_power,
+                                 esl_failure **failure);
+
+/**
+ * Has the program's clock stand still between two processes, or count that time, which is the default. A
+ * virtual clock stands still.
+ *
+ * The caller sees to it that
+ * As for `esl_durable_set_power`.
+ */
+esl_status esl_durable_set_downtime(const esl_durable *durable, bool counts, esl_failure **failure);
+
+/**
+ * Says when snapshots are taken, as `--snapshot-every` does: "60s", "64M" or "never".
+ *
+ * The caller sees to it that
+ * As for `esl_durable_set_power`; `when` ends with a null character.
+ */
+esl_status esl_durable_set_snapshots(const esl_durable *durable, const char *when, esl_failure **failure);
+
+/**
+ * Has a run whose program has changed make the new definitions before it goes on, as `--upgrade` does.
+ *
+ * The caller sees to it that
+ * As for `esl_durable_set_power`.
+ */
+esl_status esl_durable_set_upgrade(const esl_durable *durable, bool upgrades, esl_failure **failure);
+
+/**
+ * Gives a durable run a function of C before it is opened, as `esl_define` gives one to an engine: the same
+ * ones in each process.
+ *
+ * The caller sees to it that
+ * `durable` is a durable run; the texts end with null characters; `function` and `destructor` can be called
+ * with `user` on the thread that runs it; `failure` is a place that can be written, or null.
+ */
+esl_status esl_durable_define(const esl_durable *durable,
+                              const char *name,
+                              const char *lambda_list,
+                              const char *documentation,
+                              esl_effect effect,
+                              esl_function function,
+                              void *user,
+                              esl_destructor destructor,
+                              esl_failure **failure);
+
+/**
+ * Gives a durable run a function whose calls are operations, as `esl_durable_define` gives functions. An
+ * operation that the end of a process has interrupted is begun again if it has saved a state
+ * (`esl_operation_save`), or if its effect is `ESL_IDEMPOTENT`.
+ *
+ * The caller sees to it that
+ * As for `esl_durable_define`.
+ */
+esl_status esl_durable_define_operation(const esl_durable *durable,
+                                        const char *name,
+                                        const char *lambda_list,
+                                        const char *documentation,
+                                        esl_effect effect,
+                                        esl_operation_function begin,
+                                        void *user,
+                                        esl_destructor destructor,
+                                        esl_failure **failure);
+
+/**
+ * Opens a durable run with its program, a text: begins it, or goes on where an earlier process was. Nothing
+ * runs yet. `name` is that of the text in reports. A folder that another process has, that is damaged, or
+ * that has the run of another program is refused with `ESL_NOT_DURABLE`; the message says what to do.
+ *
+ * The caller sees to it that
+ * `durable` is a durable run; the texts end with null characters; `failure` is a place that can be written,
+ * or null.
+ */
+esl_status esl_durable_open(const esl_durable *durable,
+                            const char *name,
+                            const char *text,
+                            esl_failure **failure);
+
+/**
+ * As `esl_durable_open`, with the program in a source file. `require` finds modules beside it.
+ *
+ * The caller sees to it that
+ * As for `esl_durable_open`.
+ */
+esl_status esl_durable_load(const esl_durable *durable, const char *path, esl_failure **failure);
+
+/**
+ * Creates a handle of a durable run that is open and does not run yet. While a program has a handle, it
+ * waits for what may come by it. What comes is in the journal before an effect depends on it.
+ *
+ * The caller sees to it that
+ * `durable` is a durable run; `handle` and `failure` are places that can be written, or null.
+ */
+esl_status esl_durable_handle(const esl_durable *durable, esl_handle **handle, esl_failure **failure);
+
+/**
+ * Runs a durable run that is open until it ends or is paused. Waits while all tasks wait. The functions of
+ * the program are called on this thread.
+ *
+ * The caller sees to it that
+ * `durable` is a durable run; `ending` and `failure` are places that can be written, or null.
+ */
+esl_status esl_durable_run(const esl_durable *durable, esl_durable_ending *ending, esl_failure **failure);
+
+/**
+ * Has `esl_durable_run` leave the run, so that it goes on in the next process. From any thread.
+ *
+ * The caller sees to it that
+ * `durable` is a durable run; `failure` is a place that can be written, or null.
+ */
+esl_status esl_durable_pause(const esl_durable *durable, esl_failure **failure);
+
+/**
+ * Returns the number of the process in which the run goes on, from 2; 0 while it has not gone on: it began
+ * in this process, or repeats its journal. Stores the seconds since the last record of the one before.
+ *
+ * The caller sees to it that
+ * `durable` is a durable run; `downtime` is a place that can be written, or null.
+ */
+uint64_t esl_durable_resumed(const esl_durable *durable, double *downtime);
 
 /**
  * Creates an engine with the library of ESL. `config` may be null, for the defaults.
@@ -1106,6 +1298,36 @@ esl_status esl_operation_on_cancel(const esl_operation *operation,
                                    esl_notice_function function,
                                    void *user,
                                    esl_destructor destructor);
+
+/**
+ * Returns the identity of the call in a durable run, 32 hexadecimal digits, the same in each process that
+ * performs it; null in a run that is not durable. It lives as long as the operation.
+ *
+ * The caller sees to it that
+ * `operation` is an operation that has not ended, or null.
+ */
+const char *esl_operation_action(const esl_operation *operation);
+
+/**
+ * Keeps `length` bytes of C's own with the state of a durable run, in place of those that the operation has
+ * saved before, and returns when they are as safe as the run demands. The next process begins an operation
+ * that has saved a state again, whatever its effect is, and gets the bytes by `esl_operation_restore`.
+ * Returns `ESL_NOT_DURABLE` if they cannot be kept, since the disk has failed or they are more than 64 MiB:
+ * then the operation does not go on: it fails, or is freed. In a run that is not durable it has no effect.
+ *
+ * The caller sees to it that
+ * `operation` is an operation that has not ended; `bytes` points to `length` bytes.
+ */
+esl_status esl_operation_save(const esl_operation *operation, const void *bytes, size_t length);
+
+/**
+ * Returns the bytes that the operation had saved last when it was begun, in an earlier process, and stores
+ * their number; null if there are none. They live as long as the operation.
+ *
+ * The caller sees to it that
+ * `operation` is an operation that has not ended; `length` is a place that can be written, or null.
+ */
+const void *esl_operation_restore(const esl_operation *operation, size_t *length);
 
 /**
  * Makes the definitions of a text in the program, all at once, or none of them if any fails: calls that are

@@ -482,6 +482,22 @@ public:
     }
     void report_progress(const value &progress) { esl_operation_report_progress(object.get(), progress.get()); }
     bool is_cancelled() const { return esl_operation_is_cancelled(object.get()); }
+    // The identity of the call in a durable run; empty elsewhere.
+    std::string action() const {
+        const char *text = esl_operation_action(object.get());
+        return text ? text : "";
+    }
+    // Keeps bytes with the state of a durable run. False if they cannot be kept: then the operation does not go on.
+    bool save(std::string_view state) {
+        return esl_operation_save(object.get(), state.data(), state.size()) == ESL_OK;
+    }
+    // The bytes that the operation had saved last, in an earlier process.
+    std::optional<std::string_view> restore() const {
+        std::size_t length = 0;
+        const void *bytes = esl_operation_restore(object.get(), &length);
+        if (!bytes) return std::nullopt;
+        return std::string_view(static_cast<const char *>(bytes), length);
+    }
     // Has a function called when the program leaves the call. It only hands on the message.
     template <typename F>
     void on_cancel(F function) {

@@ -22,7 +22,7 @@ pub(crate) struct Settings {
     pub(crate) machine: Config,
     pub(crate) ticks: Option<u64>,
     rights: Rights,
-    has_virtual_time: bool,
+    pub(crate) has_virtual_time: bool,
     pub(crate) is_recorded: bool,
     pub(crate) replayed: Option<Arc<[NotedRecord]>>,
     output: Option<Arc<OutputOfC>>,
@@ -60,26 +60,31 @@ impl Settings {
         Ok(unsafe { look(config) }?.0.borrow().clone())
     }
 
-    /// Returns the host of an engine, and what it records or replays.
-    pub(crate) fn host(&self) -> (Box<dyn Host + Send>, Memory) {
-        let output = self.output.clone();
-        if let Some(records) = &self.replayed {
-            let mut host = ReplayHost::new(records.clone());
-            if let Some(output) = output {
-                host = host.with_screen(move |_, bytes| output.write(bytes));
-            }
-            return (Box::new(host.clone()), Memory::Replayed(host));
-        }
+    /// Returns the system as these settings let programs see it.
+    pub(crate) fn real_host(&self) -> RealHost {
         let mut host = RealHost::new(Vec::new()).with_rights(self.rights.clone());
         if self.has_virtual_time {
             host = host.with_virtual_time();
         }
-        if let Some(output) = output {
+        if let Some(output) = self.output.clone() {
             host = host.with_screen(Box::new(move |bytes| {
                 output.write(bytes);
                 Ok(())
             }));
         }
+        host
+    }
+
+    /// Returns the host of an engine, and what it records or replays.
+    pub(crate) fn host(&self) -> (Box<dyn Host + Send>, Memory) {
+        if let Some(records) = &self.replayed {
+            let mut host = ReplayHost::new(records.clone());
+            if let Some(output) = self.output.clone() {
+                host = host.with_screen(move |_, bytes| output.write(bytes));
+            }
+            return (Box::new(host.clone()), Memory::Replayed(host));
+        }
+        let host = self.real_host();
         if !self.is_recorded {
             return (Box::new(host), Memory::None);
         }

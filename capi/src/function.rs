@@ -108,7 +108,7 @@ unsafe fn handed<T>(pointer: *mut T) -> Option<Box<T>> {
 }
 
 /// Calls a function that C implements.
-fn call_function(
+pub(crate) fn call_function(
     function: unsafe extern "C" fn(
         *mut c_void,
         *const *const esl_value,

@@ -6,6 +6,7 @@
 //! | `status`, `failure` | the outcome of a call, and its reason |
 //! | `value`, `listed`, `json`, `object` | values of programs; lists of them from C; their texts in JSON; objects of C among them |
 //! | `config`, `engine` | engines: limits, rights, evaluation, the loop |
+//! | `durable` | runs that go on after the end of their process |
 //! | `program` | definitions of a program, patches, watched facts |
 //! | `function`, `operation` | functions and operations that C implements |
 //! | `handle`, `reply` | other threads, and answers to come |
@@ -24,6 +25,7 @@
 
 mod border;
 pub mod config;
+pub mod durable;
 pub mod engine;
 pub mod failure;
 mod fork;

@@ -1,21 +1,35 @@
 //! Operations that C performs.
 
-use std::ffi::{c_char, c_void};
+use std::cell::OnceCell;
+use std::ffi::{CString, c_char, c_void};
 use std::ptr;
 
 use esl::engine::Operation;
 
-use crate::border::{freeing, give, guarded, look, look_within, take, text};
+use crate::border::{elements, freeing, give, guarded, look, look_within, store, take, text};
 use crate::engine::esl_engine;
-use crate::failure::esl_failure;
+use crate::failure::{Fault, esl_failure};
 use crate::function::{UserData, esl_destructor, no_callback};
-use crate::status::esl_status;
+use crate::status::esl_status::{self, ESL_NOT_DURABLE};
 use crate::value::esl_value;
 
 /// Work that C does for a task of the program, which waits for its end. It belongs to C, which ends it once,
 /// by `esl_operation_complete` or `esl_operation_fail`, on any thread and at any time, also when the engine
 /// is gone. Until then it may be used from one thread at a time.
-pub struct esl_operation(Operation);
+pub struct esl_operation {
+    operation: Operation,
+    /// The identity of the call, as C has asked for it.
+    action: OnceCell<Option<CString>>,
+    /// The state that an earlier process has saved.
+    restored: Option<Vec<u8>>,
+}
+
+impl esl_operation {
+    pub(crate) fn new(operation: Operation) -> esl_operation {
+        let restored = operation.restore();
+        esl_operation { operation, action: OnceCell::new(), restored }
+    }
+}
 
 /// A function that begins an operation, which it hands to a thread or a queue. It is called on the thread of
 /// the engine, and does not wait.
@@ -51,7 +65,7 @@ pub unsafe extern "C" fn esl_define_operation(
             let mut engine = esl_engine::lock(engine)?;
             engine.define_operation(name, lambda_list, documentation, move |operation| {
                 let user: &UserData = &user;
-                begin(user.pointer, give(esl_operation(operation)));
+                begin(user.pointer, give(esl_operation::new(operation)));
             })?;
             Ok(())
         })
@@ -65,7 +79,7 @@ pub unsafe extern "C" fn esl_define_operation(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn esl_operation_argument_count(operation: *const esl_operation) -> usize {
     // SAFETY: each pointer is null, or to what C holds and lends.
-    unsafe { look(operation) }.map_or(0, |operation| operation.0.call().arguments().len())
+    unsafe { look(operation) }.map_or(0, |operation| operation.operation.call().arguments().len())
 }
 
 /// Returns an argument, from 0, in the order of the lambda list's variables; null beyond the last. It is a
@@ -80,7 +94,7 @@ pub unsafe extern "C" fn esl_operation_argument(
 ) -> *const esl_value {
     // SAFETY: each pointer is null, or to what C holds and lends.
     let Ok(operation) = (unsafe { look(operation) }) else { return ptr::null() };
-    operation.0.call().arguments().get(index).map_or(ptr::null(), |data| ptr::from_ref(data).cast())
+    operation.operation.call().arguments().get(index).map_or(ptr::null(), |data| ptr::from_ref(data).cast())
 }
 
 /// Ends an operation, which is freed: the call returns the value, or `NIL` for null. The value is copied.
@@ -96,7 +110,7 @@ pub unsafe extern "C" fn esl_operation_complete(
     unsafe {
         guarded(ptr::null_mut(), || {
             let data = if value.is_null() { None } else { Some(look_within(value)?.0.clone()) };
-            take(operation)?.0.complete(data);
+            take(operation)?.operation.complete(data);
             Ok(())
         })
     }
@@ -115,7 +129,7 @@ pub unsafe extern "C" fn esl_operation_fail(
     unsafe {
         guarded(ptr::null_mut(), || {
             let failure = take(failure);
-            let operation = take(operation)?.0;
+            let operation = take(operation)?.operation;
             // Without a failure it is dropped, which the call learns.
             operation.fail(failure?.to_engine());
             Ok(())
@@ -146,7 +160,7 @@ pub unsafe extern "C" fn esl_operation_report_progress(
     // SAFETY: each pointer is null, or to what C holds and lends.
     unsafe {
         guarded(ptr::null_mut(), || {
-            look(operation)?.0.report_progress(look_within(value)?.0.clone());
+            look(operation)?.operation.report_progress(look_within(value)?.0.clone());
             Ok(())
         })
     }
@@ -159,7 +173,7 @@ pub unsafe extern "C" fn esl_operation_report_progress(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn esl_operation_is_cancelled(operation: *const esl_operation) -> bool {
     // SAFETY: each pointer is null, or to what C holds and lends.
-    unsafe { look(operation) }.is_ok_and(|operation| operation.0.is_cancelled())
+    unsafe { look(operation) }.is_ok_and(|operation| operation.operation.is_cancelled())
 }
 
 /// Has `function` called when the program leaves the call, or cancels the operation; at once if it has done
@@ -182,11 +196,72 @@ pub unsafe extern "C" fn esl_operation_on_cancel(
     unsafe {
         guarded(ptr::null_mut(), || {
             let function = function.ok_or_else(no_callback)?;
-            look(operation)?.0.on_cancel(move || {
+            look(operation)?.operation.on_cancel(move || {
                 let user: &UserData = &user;
                 function(user.pointer);
             });
             Ok(())
         })
+    }
+}
+
+/// Returns the identity of the call in a durable run, 32 hexadecimal digits, the same in each process that
+/// performs it; null in a run that is not durable. It lives as long as the operation.
+///
+/// # Safety
+/// `operation` is an operation that has not ended, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_operation_action(operation: *const esl_operation) -> *const c_char {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    let Ok(operation) = (unsafe { look(operation) }) else { return ptr::null() };
+    let action = operation.action.get_or_init(|| {
+        let action = operation.operation.action()?;
+        CString::new(action.to_string()).ok()
+    });
+    action.as_ref().map_or(ptr::null(), |action| action.as_ptr())
+}
+
+/// Keeps `length` bytes of C's own with the state of a durable run, in place of those that the operation has
+/// saved before, and returns when they are as safe as the run demands. The next process begins an operation
+/// that has saved a state again, whatever its effect is, and gets the bytes by `esl_operation_restore`.
+/// Returns `ESL_NOT_DURABLE` if they cannot be kept, since the disk has failed or they are more than 64 MiB:
+/// then the operation does not go on: it fails, or is freed. In a run that is not durable it has no effect.
+///
+/// # Safety
+/// `operation` is an operation that has not ended; `bytes` points to `length` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_operation_save(
+    operation: *const esl_operation,
+    bytes: *const c_void,
+    length: usize,
+) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe {
+        guarded(ptr::null_mut(), || {
+            let state = elements(bytes.cast::<u8>(), length, "state")?;
+            if look(operation)?.operation.save(state) {
+                return Ok(());
+            }
+            Err(Fault::new(ESL_NOT_DURABLE, "the state of the operation cannot be kept"))
+        })
+    }
+}
+
+/// Returns the bytes that the operation had saved last when it was begun, in an earlier process, and stores
+/// their number; null if there are none. They live as long as the operation.
+///
+/// # Safety
+/// `operation` is an operation that has not ended; `length` is a place that can be written, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_operation_restore(
+    operation: *const esl_operation,
+    length: *mut usize,
+) -> *const c_void {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe {
+        let Ok(operation) = look(operation) else { return ptr::null() };
+        let Some(state) = &operation.restored else { return ptr::null() };
+        store(length, state.len());
+        state.as_ptr().cast()
     }
 }

@@ -44,6 +44,9 @@ pub enum esl_status {
     /// The engine replays a recording, and does something else than the recorded engine did. The message says
     /// what.
     ESL_DIVERGED = 17,
+    /// The folder of a durable run is in use, damaged, cannot be written, or has the run of another program. The
+    /// message says what to do.
+    ESL_NOT_DURABLE = 18,
     /// A fault of ESL itself. The message has what to report.
     ESL_PANIC = 15,
 }
@@ -98,6 +101,7 @@ impl esl_status {
             ESL_ENDED => c":ENDED",
             ESL_PROGRAM_EXITED => c":EXITED",
             ESL_DIVERGED => c":DIVERGED",
+            ESL_NOT_DURABLE => c":NOT-DURABLE",
             ESL_PANIC => c":PANIC",
         }
     }

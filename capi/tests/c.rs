@@ -103,6 +103,22 @@ fn the_example_ends_its_mission() {
 }
 
 #[test]
+fn a_process_that_is_killed_in_an_operation_is_followed_by_one_that_goes_on() {
+    let folder = library_folder().join("capi-durable-state");
+    let log = library_folder().join("capi-durable-log");
+    // Those of an earlier run of the tests.
+    drop((std::fs::remove_dir_all(&folder), std::fs::remove_file(&log)));
+    let arguments = [&folder, &log].map(|path| path.to_str().expect("it is text"));
+    let run = run_with("tests/durable.c", &C, &[], &arguments).expect("there is a C compiler");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    assert_eq!(String::from_utf8_lossy(&run.stdout), "5\n");
+    // The state after the third step was not saved, and nobody knows what became of the shove.
+    let steps = std::fs::read_to_string(&log).expect("it was written");
+    let expected = ["1", "2", "3", "3", "4", "5", "shove", "\"INTERRUPTED-BY-RESTART\""];
+    assert_eq!(steps.lines().collect::<Vec<_>>(), expected);
+}
+
+#[test]
 fn the_programs_of_the_manual_run() {
     let chapter = std::fs::read_to_string(root().join("../docs/manual/c.md")).expect("it can be read");
     let c = [&C[..], &["-Wno-unused-parameter"]].concat();
