@@ -11,7 +11,7 @@
 
     engine.eval("(loop for s to 5 when (> (read-sensor s) 21) collect s)")  # [3, 4, 5]
 
-`Engine` is where to begin. Values of programs that Python has no type for are in `esl.values`, exceptions in `esl.errors`;
+`Engine` is where to begin; a `DurableEngine` goes on after the end of its process. Values of programs that Python has no type for are in `esl.values`, exceptions in `esl.errors`;
 `esl.run` and `esl.replay` run whole programs. `esl.pytest_plugin` makes tests in ESL items of pytest,
 `%load_ext esl.ipython` gives notebooks the magic `%%esl`.
 """
@@ -21,6 +21,7 @@ import os
 from . import _esl
 from ._esl import Handle, Input, ProgramObject, Recording
 from .display import Event, TaskInfo, Tasks, Timeline
+from .durable import DurableEngine, Resumed, action, restore, save
 from .engine import Definition, Engine
 from .errors import (
     Aborted,
@@ -37,6 +38,7 @@ from .errors import (
     Full,
     NoMemory,
     NoSuchInput,
+    NotDurable,
     Place,
     Stopped,
 )
@@ -57,6 +59,7 @@ __all__ = [
     "Diagnostic",
     "Diverged",
     "Dotted",
+    "DurableEngine",
     "Ended",
     "Engine",
     "Error",
@@ -73,11 +76,13 @@ __all__ = [
     "Keyword",
     "NoMemory",
     "NoSuchInput",
+    "NotDurable",
     "Object",
     "Place",
     "ProgramObject",
     "Recording",
     "Replay",
+    "Resumed",
     "RunResult",
     "Stopped",
     "Subscription",
@@ -86,8 +91,11 @@ __all__ = [
     "TaskInfo",
     "Tasks",
     "Timeline",
+    "action",
     "check",
     "check_file",
     "replay",
+    "restore",
     "run",
+    "save",
 ]

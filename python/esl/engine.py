@@ -174,7 +174,7 @@ class Engine:
             return function(*positional, **keywords)
 
         called = function if signature.is_plain else call
-        self._machine.define(_name(function), signature.lambda_list, inspect.getdoc(function) or "", called)
+        self._machine.define(function_name(function), signature.lambda_list, inspect.getdoc(function) or "", called)
         return function
 
     def operation(self, function: F) -> F:
@@ -198,7 +198,7 @@ class Engine:
                 engine._begin_in_loop(signature, function, operation)
 
         self._machine.define_operation(
-            _name(function), signature.lambda_list, inspect.getdoc(function) or "", begin
+            function_name(function), signature.lambda_list, inspect.getdoc(function) or "", begin
         )
         return function
 
@@ -332,7 +332,8 @@ async def _read_later(future: Any, read: Callable[[Any], Any]) -> Any:
     return read(await future)
 
 
-def _name(function: Callable[..., Any]) -> str:
+def function_name(function: Callable[..., Any]) -> str:
+    """Returns the name by which a program calls a function of Python."""
     if function.__name__ == "<lambda>":
         raise TypeError("a lambda has no name by which a program can call it: define the function by `def`")
     return program_name(function.__name__)

@@ -139,6 +139,10 @@ class Diverged(Error):
     """The engine replays a recording, and does something else than the recorded engine did."""
 
 
+class NotDurable(Error):
+    """The folder of a durable run is in use, damaged, cannot be written, or has the run of another program."""
+
+
 class NoMemory(Error):
     """The limit of memory leaves no room."""
 

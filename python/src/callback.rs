@@ -6,7 +6,7 @@ use esl::Data;
 use esl::engine::{Call, Failure};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyTuple};
+use pyo3::types::{PyBytes, PyList, PyTuple};
 
 use crate::failure::of_exception;
 use crate::process::stay_at_exit;
@@ -81,6 +81,27 @@ impl Operation {
     #[getter]
     fn is_cancelled(&self) -> bool {
         self.lock().as_ref().is_some_and(esl::engine::Operation::is_cancelled)
+    }
+
+    /// The identity of the call in a durable run, the same in each process that performs it.
+    #[getter]
+    fn action(&self) -> Option<String> {
+        let action = self.lock().as_ref().and_then(esl::engine::Operation::action);
+        action.map(|action| action.to_string())
+    }
+
+    /// Keeps bytes with the state of a durable run, in place of those before. Returns whether they are safe.
+    fn save(&self, py: Python<'_>, state: &[u8]) -> PyResult<bool> {
+        // Without the lock: another thread may wait for it with the interpreter's.
+        let saved = self.lock().as_ref().map(esl::engine::Operation::state);
+        let saved = saved.ok_or_else(|| PyRuntimeError::new_err("the operation has ended"))?;
+        Ok(py.detach(|| saved.save(state)))
+    }
+
+    /// The bytes that the operation has saved last, in this process or an earlier one.
+    fn restore<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyBytes>> {
+        let state = self.lock().as_ref().and_then(esl::engine::Operation::restore);
+        state.map(|state| PyBytes::new(py, &state))
     }
 
     /// Ends the operation: the call returns the value.

@@ -5,6 +5,7 @@
 //! | `value` | values of programs as values of Python, and back |
 //! | `failure` | exceptions |
 //! | `engine` | engines, and driving them until an answer has come |
+//! | `durable` | runs that go on after the end of their process |
 //! | `callback` | functions and operations that Python implements |
 //! | `handle` | other threads, and answers to come |
 //! | `watching` | events of tasks, changes of facts, drawings |
@@ -24,6 +25,7 @@
 mod callback;
 #[cfg(feature = "commands")]
 pub mod command;
+mod durable;
 mod engine;
 mod failure;
 mod handle;
@@ -42,6 +44,8 @@ use pyo3::prelude::*;
 mod _esl {
     #[pymodule_export]
     use super::callback::Operation;
+    #[pymodule_export]
+    use super::durable::DurableEngine;
     #[pymodule_export]
     use super::engine::Engine;
     #[pymodule_export]

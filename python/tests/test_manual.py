@@ -11,7 +11,7 @@ CHAPTER = pathlib.Path(__file__).parents[2] / "docs" / "manual" / "python.md"
 def test_examples():
     names = {}
     examples = re.findall(r"```python\n(.*?)```\n```text\n(.*?)```", CHAPTER.read_text(), re.S)
-    assert len(examples) == 7
+    assert len(examples) == 8
     for code, expected in examples:
         printed = io.StringIO()
         with redirect_stdout(printed):
