@@ -3,6 +3,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
+use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use esl_conformance::process;
@@ -111,4 +112,97 @@ fn a_client_of_a_broker_connects_and_subscribes_again() {
     assert!(lines.any(|line| line == "sum 142"));
     drop(child.kill());
     drop(child.wait());
+}
+
+/// Runs an agent that says `heard` for each message, in two processes: the first is killed behind a message. In
+/// each one `speak` begins to speak, until what it returns is dropped.
+fn hears_again<T>(name: &str, text: &str, speak: impl Fn() -> T) {
+    let agent = Agent::new(name, text);
+    for options in [&["--allow-net=127.0.0.1"][..], &["--allow-net=127.0.0.1", "--snapshot-every", "1ms"]] {
+        let mut running = agent.start(options);
+        let speaker = speak();
+        running.wait_for("heard");
+        running.send("-KILL");
+        drop(speaker);
+        running.end();
+    }
+}
+
+/// A program that speaks until this is dropped.
+struct Speaker(std::process::Child);
+
+impl Speaker {
+    fn of(folder: &esl_conformance::folder::Folder, text: &str) -> Speaker {
+        folder.file("speaker.esl", text);
+        let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "speaker.esl"]);
+        let command = command.current_dir(folder.path()).stdout(std::process::Stdio::null());
+        Speaker(command.stderr(std::process::Stdio::null()).spawn().expect("the command is there"))
+    }
+}
+
+impl Drop for Speaker {
+    fn drop(&mut self) {
+        drop((self.0.kill(), self.0.wait()));
+    }
+}
+
+#[test]
+fn a_subscription_of_zenoh_is_made_again() {
+    let (folder, port) = (esl_conformance::folder::Folder::new("durable-zenoh-speaker"), free_port());
+    let text = format!(
+        "(require :zenoh)
+(zenoh:with-session (session :listen \"tcp/127.0.0.1:{port}\" :mode :router)
+  (let ((lights (zenoh:subscribe session \"room/*/light\")))
+    (loop (wait-for-event lights) (format t \"heard~%\") (finish-output))))"
+    );
+    let speaker = format!(
+        "(require :zenoh)
+(zenoh:with-session (session :connect \"tcp/127.0.0.1:{port}\" :timeout 20)
+  (loop (zenoh:put session \"room/1/light\" \"on\") (sleep 0.02)))"
+    );
+    hears_again("durable-zenoh", &text, || Speaker::of(&folder, &speaker));
+}
+
+#[test]
+fn a_subscription_of_ros_is_made_again() {
+    let (folder, port) = (esl_conformance::folder::Folder::new("durable-ros-speaker"), free_port());
+    let text = format!(
+        "(require :ros)
+(ros:with-node (node \"listener\" :listen \"tcp/127.0.0.1:{port}\" :mode :router)
+  (let ((ticks (ros:subscribe node \"/tick\" \"std_msgs/msg/String\")))
+    (loop (wait-for-event ticks) (format t \"heard~%\") (finish-output))))"
+    );
+    let speaker = format!(
+        "(require :ros)
+(ros:with-node (node \"speaker\" :connect \"tcp/127.0.0.1:{port}\" :timeout 20)
+  (let ((ticks (ros:advertise node \"/tick\" \"std_msgs/msg/String\")))
+    (loop (ros:publish ticks :data \"tick\") (sleep 0.02))))"
+    );
+    hears_again("durable-ros", &text, || Speaker::of(&folder, &speaker));
+}
+
+#[test]
+fn a_subscription_of_mavlink_is_made_again() {
+    let port = free_port();
+    let text = format!(
+        "(require :mavlink)
+(mavlink:with-link (copter \"udpin:127.0.0.1:{port}\")
+  (let ((beats (mavlink:subscribe copter :heartbeat :system :any)))
+    (loop (wait-for-event beats) (format t \"heard~%\") (finish-output))))"
+    );
+    // Nobody hears a datagram before the link is open.
+    hears_again("durable-mavlink", &text, || {
+        let (stop, stopped) = std::sync::mpsc::channel::<()>();
+        std::thread::spawn(move || {
+            let socket = std::net::UdpSocket::bind("127.0.0.1:0").expect("there is a port");
+            for sequence in (0..=u8::MAX).cycle() {
+                // Until a link is there, the system may tell that nobody listens.
+                drop(socket.send_to(&crate::mavlink::heartbeat(1, sequence), ("127.0.0.1", port)));
+                if stopped.recv_timeout(Duration::from_millis(20)) != Err(RecvTimeoutError::Timeout) {
+                    return;
+                }
+            }
+        });
+        stop
+    });
 }

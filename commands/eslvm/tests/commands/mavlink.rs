@@ -259,7 +259,7 @@ fn a_vehicle_at_a_serial_line_is_commanded_also_after_the_line_was_pulled_out() 
 }
 
 /// Returns a frame of a heartbeat of MAVLink 2 by this system.
-fn heartbeat(system: u8, sequence: u8) -> Vec<u8> {
+pub(crate) fn heartbeat(system: u8, sequence: u8) -> Vec<u8> {
     let mut frame = vec![0xfd, 9, 0, 0, sequence, system, 1, 0, 0, 0, 4, 0, 0, 0, 2, 3, 0x81, 4, 3];
     let mut crc = 0xffff_u16;
     // The last one is the seed of heartbeats.
