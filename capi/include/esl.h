@@ -95,8 +95,8 @@ typedef enum {
    */
   ESL_DIVERGED = 17,
   /**
-   * The folder of a durable run is in use, damaged, cannot be written, or has the run of another program. The
-   * message says what to do.
+   * The folder of a durable run is in use, damaged, cannot be written, or has the run of another program.
+   * The message says what to do.
    */
   ESL_NOT_DURABLE = 18,
   /**
@@ -623,41 +623,6 @@ esl_status esl_durable_new(const char *folder,
 esl_status esl_durable_free(esl_durable *durable);
 
 /**
- * Has the run survive loss of power too: it waits for the disk before each effect.
- *
- * The caller sees to it that
- * `durable` is a durable run that is not open; `failure` is a place that can be written, or null.
- */
-esl_status esl_durable_set_power(const esl_durable *durable,
-                                 bool survives_loss_of_power,
-                                 esl_failure **failure);
-
-/**
- * Has the program's clock stand still between two processes, or count that time, which is the default. A
- * virtual clock stands still.
- *
- * The caller sees to it that
- * As for `esl_durable_set_power`.
- */
-esl_status esl_durable_set_downtime(const esl_durable *durable, bool counts, esl_failure **failure);
-
-/**
- * Says when snapshots are taken, as `--snapshot-every` does: "60s", "64M" or "never".
- *
- * The caller sees to it that
- * As for `esl_durable_set_power`; `when` ends with a null character.
- */
-esl_status esl_durable_set_snapshots(const esl_durable *durable, const char *when, esl_failure **failure);
-
-/**
- * Has a run whose program has changed make the new definitions before it goes on, as `--upgrade` does.
- *
- * The caller sees to it that
- * As for `esl_durable_set_power`.
- */
-esl_status esl_durable_set_upgrade(const esl_durable *durable, bool upgrades, esl_failure **failure);
-
-/**
  * Gives a durable run a function of C before it is opened, as `esl_define` gives one to an engine: the same
  * ones in each process.
  *
@@ -717,7 +682,7 @@ esl_status esl_durable_load(const esl_durable *durable, const char *path, esl_fa
 
 /**
  * Creates a handle of a durable run that is open and does not run yet. While a program has a handle, it
- * waits for what may come by it. What comes is in the journal before an effect depends on it.
+ * waits for messages by it, which are in the journal before an effect depends on them.
  *
  * The caller sees to it that
  * `durable` is a durable run; `handle` and `failure` are places that can be written, or null.
@@ -749,6 +714,41 @@ esl_status esl_durable_pause(const esl_durable *durable, esl_failure **failure);
  * `durable` is a durable run; `downtime` is a place that can be written, or null.
  */
 uint64_t esl_durable_resumed(const esl_durable *durable, double *downtime);
+
+/**
+ * Has the run survive loss of power too: it waits for the disk before each effect.
+ *
+ * The caller sees to it that
+ * `durable` is a durable run that is not open; `failure` is a place that can be written, or null.
+ */
+esl_status esl_durable_set_power(const esl_durable *durable,
+                                 bool survives_loss_of_power,
+                                 esl_failure **failure);
+
+/**
+ * Has the program's clock stand still between two processes, or count that time, which is the default. A
+ * virtual clock stands still.
+ *
+ * The caller sees to it that
+ * As for `esl_durable_set_power`.
+ */
+esl_status esl_durable_set_downtime(const esl_durable *durable, bool counts, esl_failure **failure);
+
+/**
+ * Says when snapshots are taken, as `--snapshot-every` does: "60s", "64M" or "never".
+ *
+ * The caller sees to it that
+ * As for `esl_durable_set_power`; `when` ends with a null character.
+ */
+esl_status esl_durable_set_snapshots(const esl_durable *durable, const char *when, esl_failure **failure);
+
+/**
+ * Has a run whose program has changed make the new definitions before it goes on, as `--upgrade` does.
+ *
+ * The caller sees to it that
+ * As for `esl_durable_set_power`.
+ */
+esl_status esl_durable_set_upgrade(const esl_durable *durable, bool upgrades, esl_failure **failure);
 
 /**
  * Creates an engine with the library of ESL. `config` may be null, for the defaults.

@@ -6,8 +6,7 @@ use std::ptr;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ::esl_durable::{
-    Downtime, Durability, DurableControl, DurableEnding, DurableEngine, DurableError, DurableOptions,
-    DurableSettings,
+    Downtime, DurableControl, DurableEnding, DurableEngine, DurableError, DurableOptions, DurableSettings,
 };
 use esl::Config;
 use esl::engine::HostDefinition;
@@ -34,7 +33,7 @@ pub struct esl_durable {
 }
 
 /// Where a durable run stands in this process.
-enum Stage {
+pub(crate) enum Stage {
     /// It gets its functions.
     Preparing(Box<Preparation>),
     /// It can be run.
@@ -45,14 +44,14 @@ enum Stage {
     Over(Option<DurableControl>),
 }
 
-/// What a durable run gets before it is opened.
-struct Preparation {
+/// The settings and functions of a durable run, before it is opened.
+pub(crate) struct Preparation {
     folder: PathBuf,
     machine: Config,
     host: RealHost,
-    options: DurableOptions,
+    pub(crate) options: DurableOptions,
     functions: Vec<HostDefinition>,
-    upgrades: bool,
+    pub(crate) upgrades: bool,
 }
 
 /// The effect of making a call of a function twice. It decides about a call that the end of a process has
@@ -97,7 +96,7 @@ impl esl_durable {
     ///
     /// # Safety
     /// The pointer is null, or to a durable run that is not freed meanwhile.
-    unsafe fn lock<'a>(durable: *const esl_durable) -> Result<MutexGuard<'a, Stage>, Fault> {
+    pub(crate) unsafe fn lock<'a>(durable: *const esl_durable) -> Result<MutexGuard<'a, Stage>, Fault> {
         // SAFETY: each pointer is null, or to what C holds and lends.
         let durable = unsafe { look(durable) }?;
         durable.process.check()?;
@@ -112,7 +111,7 @@ fn too_late() -> Fault {
 }
 
 impl Stage {
-    fn preparation(&mut self) -> Result<&mut Preparation, Fault> {
+    pub(crate) fn preparation(&mut self) -> Result<&mut Preparation, Fault> {
         match self {
             Stage::Preparing(preparation) => Ok(preparation),
             _ => Err(too_late()),
@@ -210,87 +209,6 @@ pub unsafe extern "C" fn esl_durable_free(durable: *mut esl_durable) -> esl_stat
 
 fn busy() -> Fault {
     Fault::new(ESL_BUSY, "a thread runs the durable run: pause it, and wait for the end of `esl_durable_run`")
-}
-
-/// Has the run survive loss of power too: it waits for the disk before each effect.
-///
-/// # Safety
-/// `durable` is a durable run that is not open; `failure` is a place that can be written, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn esl_durable_set_power(
-    durable: *const esl_durable,
-    survives_loss_of_power: bool,
-    failure: *mut *mut esl_failure,
-) -> esl_status {
-    // SAFETY: each pointer is null, or to what C holds and lends.
-    unsafe {
-        guarded(failure, || {
-            let durability = if survives_loss_of_power { Durability::Power } else { Durability::Process };
-            esl_durable::lock(durable)?.preparation()?.options.durability = durability;
-            Ok(())
-        })
-    }
-}
-
-/// Has the program's clock stand still between two processes, or count that time, which is the default. A
-/// virtual clock stands still.
-///
-/// # Safety
-/// As for `esl_durable_set_power`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn esl_durable_set_downtime(
-    durable: *const esl_durable,
-    counts: bool,
-    failure: *mut *mut esl_failure,
-) -> esl_status {
-    // SAFETY: each pointer is null, or to what C holds and lends.
-    unsafe {
-        guarded(failure, || {
-            let downtime = if counts { Downtime::Counts } else { Downtime::Stops };
-            esl_durable::lock(durable)?.preparation()?.options.downtime = downtime;
-            Ok(())
-        })
-    }
-}
-
-/// Says when snapshots are taken, as `--snapshot-every` does: "60s", "64M" or "never".
-///
-/// # Safety
-/// As for `esl_durable_set_power`; `when` ends with a null character.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn esl_durable_set_snapshots(
-    durable: *const esl_durable,
-    when: *const c_char,
-    failure: *mut *mut esl_failure,
-) -> esl_status {
-    // SAFETY: each pointer is null, or to what C holds and lends.
-    unsafe {
-        guarded(failure, || {
-            let when = text(when, "time of snapshots")?;
-            let snapshots = when.parse().map_err(|message| Fault::new(ESL_INVALID_ARGUMENT, message))?;
-            esl_durable::lock(durable)?.preparation()?.options.snapshots = snapshots;
-            Ok(())
-        })
-    }
-}
-
-/// Has a run whose program has changed make the new definitions before it goes on, as `--upgrade` does.
-///
-/// # Safety
-/// As for `esl_durable_set_power`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn esl_durable_set_upgrade(
-    durable: *const esl_durable,
-    upgrades: bool,
-    failure: *mut *mut esl_failure,
-) -> esl_status {
-    // SAFETY: each pointer is null, or to what C holds and lends.
-    unsafe {
-        guarded(failure, || {
-            esl_durable::lock(durable)?.preparation()?.upgrades = upgrades;
-            Ok(())
-        })
-    }
 }
 
 /// Adds a function before the run is opened.
@@ -437,7 +355,7 @@ pub unsafe extern "C" fn esl_durable_load(
 }
 
 /// Creates a handle of a durable run that is open and does not run yet. While a program has a handle, it
-/// waits for what may come by it. What comes is in the journal before an effect depends on it.
+/// waits for messages by it, which are in the journal before an effect depends on them.
 ///
 /// # Safety
 /// `durable` is a durable run; `handle` and `failure` are places that can be written, or null.

@@ -6,7 +6,7 @@
 //! | `status`, `failure` | the outcome of a call, and its reason |
 //! | `value`, `listed`, `json`, `object` | values of programs; lists of them from C; their texts in JSON; objects of C among them |
 //! | `config`, `engine` | engines: limits, rights, evaluation, the loop |
-//! | `durable` | runs that go on after the end of their process |
+//! | `durable`, `durable_settings` | runs that go on after the end of their process; their settings |
 //! | `program` | definitions of a program, patches, watched facts |
 //! | `function`, `operation` | functions and operations that C implements |
 //! | `handle`, `reply` | other threads, and answers to come |
@@ -26,6 +26,7 @@
 mod border;
 pub mod config;
 pub mod durable;
+pub mod durable_settings;
 pub mod engine;
 pub mod failure;
 mod fork;

@@ -44,8 +44,8 @@ pub enum esl_status {
     /// The engine replays a recording, and does something else than the recorded engine did. The message says
     /// what.
     ESL_DIVERGED = 17,
-    /// The folder of a durable run is in use, damaged, cannot be written, or has the run of another program. The
-    /// message says what to do.
+    /// The folder of a durable run is in use, damaged, cannot be written, or has the run of another program.
+    /// The message says what to do.
     ESL_NOT_DURABLE = 18,
     /// A fault of ESL itself. The message has what to report.
     ESL_PANIC = 15,

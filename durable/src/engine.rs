@@ -45,8 +45,8 @@ pub enum DurableEnding {
 /// [`DurableEngine::handle`]: everything goes through the journal. The effect of each function decides about
 /// a call that the end of a process has interrupted: an [idempotent](esl_host::HostRow::idempotent) one is
 /// made again with the same identity (`HostOperation::action`); the others fail with
-/// `:interrupted-by-restart`. An operation that has [saved](esl_host::HostOperation::save) bytes of its own is
-/// begun again too, and restores them there.
+/// `:interrupted-by-restart`. An operation that has [saved](esl_host::HostOperation::save) bytes of its own
+/// is begun again too, and restores them there.
 pub struct DurableEngine {
     run: DurableRun,
     machine: Vm,

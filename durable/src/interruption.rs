@@ -95,8 +95,8 @@ pub(crate) fn open_call(call: HostCall<'_>, number: u64, action: ActionId) -> Op
     OpenCall { number, name: name.into(), arguments: arguments.to_vec(), effect, action }
 }
 
-/// Returns the news of a call that the end of its process has interrupted; `None` if it is begun again. It may
-/// have saved a state.
+/// Returns the news of a call that the end of its process has interrupted; `None` if it is begun again. It
+/// may have saved a state.
 pub(crate) fn news_of(open: &OpenCall, has_saved: bool) -> Option<News> {
     if is_repeated(open, has_saved) {
         return None;
@@ -106,8 +106,8 @@ pub(crate) fn news_of(open: &OpenCall, has_saved: bool) -> Option<News> {
     Some(after_restart(call, Some(*action)))
 }
 
-/// Returns whether a call that the end of its process has interrupted is begun again: by its effect, or by the
-/// state that it has saved.
+/// Returns whether a call that the end of its process has interrupted is begun again: by its effect, or by
+/// the state that it has saved.
 pub(crate) fn is_repeated(open: &OpenCall, has_saved: bool) -> bool {
     (has_saved || open.effect.may_be_repeated()) && !has_gone_object(&open.arguments)
 }

@@ -92,8 +92,8 @@ impl RunPatch {
 }
 
 impl DurableState {
-    /// Returns the patches of operators that are in force where the journal ends, newest first. A run that has
-    /// ended has none.
+    /// Returns the patches of operators that are in force where the journal ends, newest first. A run that
+    /// has ended has none.
     ///
     /// # Errors
     /// [`DurableError::Machine`].

@@ -1,8 +1,8 @@
 //! Rehearsals: the last stretch of a run, taken once more by another version of its program.
 //!
-//! A copy of the run as it was is upgraded, and goes on from there in a world of scripts: messages, signals and
-//! requests come when they came, and a call gets the answer that the run had for the same call. Another call
-//! fails with `:not-in-this-world`, since nobody knows its answer, and the rehearsal names it. Nothing is
+//! A copy of the run as it was is upgraded, and goes on from there in a world of scripts: messages, signals
+//! and requests come when they came, and a call gets the answer that the run had for the same call. Another
+//! call fails with `:not-in-this-world`, since its answer is unknown, and the rehearsal names it. Nothing is
 //! written, and nothing leaves.
 
 use std::collections::{HashMap, VecDeque};
@@ -33,7 +33,7 @@ use super::{Downtime, DurableError, DurableRun};
 /// Calls that are named.
 const NAMED: usize = 5;
 
-/// What another version of a program has done with the last stretch of a run.
+/// The course that another version of a program has taken with the last stretch of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Rehearsal {
     /// The changes of the program.
@@ -59,9 +59,9 @@ pub struct Rehearsal {
     pub ended: Option<u8>,
 }
 
-/// The answers of the run, and what was made of them.
+/// The answers of the run, and the calls that were made.
 #[derive(Default)]
-struct Script {
+struct PastScript {
     /// Outcomes of operations, and the time that they have taken, by the calls.
     outcomes: HashMap<u32, VecDeque<(u64, News)>>,
     /// Answers of functions and files, by the questions.
@@ -72,7 +72,7 @@ struct Script {
     named: Vec<(f64, String)>,
 }
 
-impl Script {
+impl PastScript {
     fn answer(&mut self, question: QuestionHash) -> Option<Record> {
         self.answers.get_mut(&question.0)?.pop_front()
     }
@@ -97,17 +97,17 @@ impl Script {
 /// The outside of a rehearsal.
 struct ScriptedHost {
     inner: VirtualHost,
-    script: Arc<Mutex<Script>>,
+    script: Arc<Mutex<PastScript>>,
 }
 
-fn lock(script: &Mutex<Script>) -> MutexGuard<'_, Script> {
+fn lock(script: &Mutex<PastScript>) -> MutexGuard<'_, PastScript> {
     // Each change is made whole, so a panic elsewhere does not corrupt it.
     script.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A world that does what it did in a stretch of a run.
+/// A world that acts as it did in a stretch of a run.
 struct World {
-    script: Arc<Mutex<Script>>,
+    script: Arc<Mutex<PastScript>>,
     captured: Captured,
     arrivals: usize,
     stretch: Duration,
@@ -116,7 +116,7 @@ struct World {
 impl World {
     /// Creates the world of these records, from `begun` until `end`, and the outside that it is.
     fn of(records: &[NotedRecord], begun: u64, end: u64) -> (World, ScriptedHost) {
-        let mut script = Script { begun, ..Script::default() };
+        let mut script = PastScript { begun, ..PastScript::default() };
         let mut inner = VirtualHost::new();
         inner.advance(begun);
         let (mut now, mut arrivals) = (begun, 0);
@@ -168,7 +168,7 @@ impl World {
         (World { script, captured, arrivals, stretch }, host)
     }
 
-    /// Returns what was made of it.
+    /// Returns the course that a program has taken in it.
     fn rehearsal(
         &self,
         changes: ProgramChanges,
@@ -304,13 +304,13 @@ struct PassingFolder(PathBuf);
 
 impl Drop for PassingFolder {
     fn drop(&mut self) {
-        // What is left is a copy.
+        // It is only a copy.
         drop(std::fs::remove_dir_all(&self.0));
     }
 }
 
-/// Tries another version of the program of a run on the last stretch of it: so much of its time, or as much as
-/// its generations are kept. `None` if the run has this program.
+/// Tries another version of the program of a run on the last stretch of it: so much of its time, or as much
+/// as its generations are kept. `None` if the run has this program.
 ///
 /// # Errors
 /// [`DurableError::NotUpgraded`], and the reasons for which a run does not go on.

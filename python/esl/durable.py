@@ -114,6 +114,8 @@ class DurableEngine:
         self._run: Optional[_esl.DurableEngine] = None
         self._loop: Optional[asyncio.AbstractEventLoop] = None
         self._tasks: "set[asyncio.Task[Any]]" = set()
+        self._async_function: Optional[Callable[..., Any]] = None
+        self._early: list[tuple[Signature, Callable[..., Any], _esl.Operation]] = []
 
     # ---- functions of Python
 
@@ -152,6 +154,7 @@ class DurableEngine:
     def _define_operation(self, function: F, idempotent: bool) -> F:
         signature = signature_of(function)
         if inspect.iscoroutinefunction(function):
+            self._async_function = function
 
             def begin(operation: _esl.Operation) -> None:
                 self._begin_in_loop(signature, function, operation)
@@ -178,11 +181,13 @@ class DurableEngine:
         self._rows.append((name, signature.lambda_list, documentation, called, is_operation, idempotent))
 
     def _begin_in_loop(self, signature: Signature, function: Callable[..., Any], operation: _esl.Operation) -> None:
+        if self._run is None:
+            # It was under way in an earlier process, and goes on when the run does.
+            self._early.append((signature, function, operation))
+            return
         loop = self._loop
         if loop is None:
-            raise RuntimeError(
-                f"`{function.__name__}` is async, so the run needs an event loop: `await engine.run_async()`"
-            )
+            raise RuntimeError(_needs_loop(function))
         positional, keywords = arguments_of(signature, operation.arguments)
 
         async def perform() -> Any:
@@ -239,12 +244,17 @@ class DurableEngine:
         process goes on. Ctrl-C pauses it, and raises `KeyboardInterrupt`."""
         self.open()
         assert self._run is not None
+        if self._async_function is not None and self._loop is None:
+            raise RuntimeError(_needs_loop(self._async_function))
         return self._run.run()
 
     async def run_async(self) -> Optional[int]:
         """As `run`, while async operations run as tasks of the event loop. If it is cancelled, the run is paused."""
         self.open()
         self._loop = asyncio.get_running_loop()
+        early, self._early = self._early, []
+        for operation in early:
+            self._begin_in_loop(*operation)
         running = self._loop.run_in_executor(None, self.run)
         try:
             return await asyncio.shield(running)
@@ -268,6 +278,10 @@ class DurableEngine:
         """How the run goes on in this process; None for a new run, and until its journal is repeated."""
         found = self._run.resumed if self._run is not None else None
         return None if found is None else Resumed(*found)
+
+
+def _needs_loop(function: Callable[..., Any]) -> str:
+    return f"`{function.__name__}` is async, so the run needs an event loop: `await engine.run_async()`"
 
 
 def _call_in(loop: asyncio.AbstractEventLoop, function: Callable[[], object]) -> None:

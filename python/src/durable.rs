@@ -27,8 +27,8 @@ use crate::process::{Process, detached};
 /// Longest wait until signals of the process are looked for.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// A definition of a function of Python: name, lambda list, documentation, the function, whether its calls are
-/// operations, whether a call may be made twice.
+/// A definition of a function of Python: name, lambda list, documentation, the function, whether its calls
+/// are operations, whether a call may be made twice.
 type Row = (String, String, String, Py<PyAny>, bool, bool);
 
 /// A durable run, which is open.
@@ -188,8 +188,8 @@ impl DurableEngine {
         self.control.pause();
     }
 
-    /// The number of this process of the run, and the seconds since the last record of the one before; nothing
-    /// while the run has not gone on.
+    /// The number of this process of the run, and the seconds since the last record of the one before;
+    /// nothing while the run has not gone on.
     #[getter]
     fn resumed(&self) -> Option<(u64, f64)> {
         self.control.resumed().map(|resumed| (resumed.life.number, resumed.downtime))

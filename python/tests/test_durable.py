@@ -130,6 +130,27 @@ def test_a_paused_run_goes_on_with_async_operations(tmp_path):
     assert again.resumed.process == 2 and again.resumed.downtime >= 0
 
 
+def test_an_async_operation_under_way_goes_on_in_the_next_loop(tmp_path):
+    def made():
+        engine = esl.DurableEngine(tmp_path / "state", text="(exit (slow 3))")
+
+        @engine.operation
+        async def slow(number):
+            if esl.restore() is None:
+                esl.save(b"begun")
+                engine.pause()
+                await asyncio.sleep(3600)
+            return number + len(esl.restore())
+
+        return engine
+
+    assert asyncio.run(made().run_async()) is None
+    again = made()
+    with pytest.raises(RuntimeError, match="`slow` is async, so the run needs an event loop"):
+        again.run()
+    assert asyncio.run(again.run_async()) == 8
+
+
 def test_messages_of_other_threads_are_kept(tmp_path):
     def made():
         text = "(define-input order) (defvar *sum* 0) (loop (incf *sum* (wait-for-event order)) (tell *sum*))"

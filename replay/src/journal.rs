@@ -403,9 +403,8 @@ impl RunJournal {
         self.upgrades
             .extend(upgrades.map(|upgrade| JournalUpgrade { records: upgrade.records + offset, ..upgrade }));
         // Its beginning repeats the states that were saved before.
-        self.saved = next.saved;
+        (self.saved, self.generation) = (next.saved, next.generation);
         (self.length, self.time, self.writer) = (next.length, next.time, next.writer);
-        self.generation = next.generation;
         true
     }
 }

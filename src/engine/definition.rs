@@ -13,10 +13,10 @@ use crate::data::Data;
 use crate::error::Error;
 
 /// Makes the code of a function, for the variables of its lambda list.
-type Make = Box<dyn FnOnce(Arc<[String]>) -> HostFunction + Send>;
+type FunctionMaker = Box<dyn FnOnce(Arc<[String]>) -> HostFunction + Send>;
 
-/// A function of the embedder's for programs: [`Engine::define`] and [`Engine::define_operation`] make one and
-/// give it to their machine. An engine whose run is durable takes all of its functions at once.
+/// A function of the embedder's for programs: [`Engine::define`] and [`Engine::define_operation`] make one
+/// and give it to their machine. An engine whose run is durable takes all of its functions at once.
 ///
 /// ```
 /// use esl::Engine;
@@ -34,7 +34,7 @@ pub struct HostDefinition {
     documentation: String,
     effect: CallEffect,
     waits: bool,
-    make: Make,
+    make: FunctionMaker,
 }
 
 /// Returns the form that defines a function of the host.
@@ -89,7 +89,13 @@ impl HostDefinition {
         HostDefinition::new(name, lambda_list, documentation, true, Box::new(make))
     }
 
-    fn new(name: &str, lambda_list: &str, documentation: &str, waits: bool, make: Make) -> HostDefinition {
+    fn new(
+        name: &str,
+        lambda_list: &str,
+        documentation: &str,
+        waits: bool,
+        make: FunctionMaker,
+    ) -> HostDefinition {
         let effect = CallEffect::default();
         let (name, lambda_list) = (name.to_owned(), lambda_list.to_owned());
         HostDefinition { name, lambda_list, documentation: documentation.to_owned(), effect, waits, make }

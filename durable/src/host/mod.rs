@@ -121,20 +121,18 @@ impl<H: Host> DurableHost<H> {
             return true;
         };
         self.live.go_on(self.past.not_due());
-        let is_told = resumption.is_told();
         let (life, downtime) = resumption.begin(self.live.host_mut().monotonic());
         self.log.note_life(life);
         // The upgrade is made before the program is told of its restart.
         let mut first = self.upgrade.take().map_or(Vec::new(), |upgrade| self.begin_upgrade(upgrade));
-        if is_told {
+        if resumption.is_told() {
             // Those of this process come later.
             first.push(Incoming::Unattended);
             first.push(resumed_message(&life, downtime));
         }
+        // Nothing is interrupted or gone in a rehearsal: the rest comes by the script.
         if self.control.is_rehearsal() {
-            // Nothing is interrupted, and nothing gone: the rest of the run comes by the script.
-            self.open.clear();
-            self.early.drain(..self.lost);
+            (self.open, self.early) = (BTreeMap::new(), self.early.split_off(self.lost));
         }
         let mut interrupted = usize::from(self.interrupts);
         for (number, news) in std::mem::take(&mut self.open) {

@@ -37,8 +37,8 @@ pub(crate) struct LookOptions {
     /// Show the patches of operators that are in force, the newest first
     #[arg(long, conflicts_with_all = ["facts", "tasks", "log"])]
     patches: bool,
-    /// Show the changes of this program, and try an upgrade to it on copies of the run: as it is, and as it was
-    /// an hour before its last record, or as long as its journal is kept, with all that came from then on
+    /// Show the changes of this program, and try an upgrade to it on copies of the run: as it is, and as it
+    /// was an hour before its last record, or as long as its journal is kept, with the messages from then on
     #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["facts", "tasks", "log", "patches"])]
     upgrade: Option<std::path::PathBuf>,
     /// Copy the run into this folder: a run of its own, for experiments
@@ -105,7 +105,7 @@ fn check_upgrade(folder: &Path, file: &Path, library: &[std::path::PathBuf]) -> 
     Ok(SUCCESS)
 }
 
-/// Prints what another program has done with the last stretch of a run.
+/// Prints the course that another program has taken with the last stretch of a run.
 fn print_rehearsal(rehearsal: &Rehearsal) {
     let Rehearsal { upgrade, stretch, arrivals, alike, others, named, left_out, errors, ended, .. } =
         rehearsal;

@@ -114,8 +114,8 @@ fn a_client_of_a_broker_connects_and_subscribes_again() {
     drop(child.wait());
 }
 
-/// Runs an agent that says `heard` for each message, in two processes: the first is killed behind a message. In
-/// each one `speak` begins to speak, until what it returns is dropped.
+/// Runs an agent that says `heard` for each message, in two processes: the first is killed behind a message.
+/// In each one `speak` begins to speak, until its value is dropped.
 fn hears_again<T>(name: &str, text: &str, speak: impl Fn() -> T) {
     let agent = Agent::new(name, text);
     for options in [&["--allow-net=127.0.0.1"][..], &["--allow-net=127.0.0.1", "--snapshot-every", "1ms"]] {
@@ -190,7 +190,7 @@ fn a_subscription_of_mavlink_is_made_again() {
   (let ((beats (mavlink:subscribe copter :heartbeat :system :any)))
     (loop (wait-for-event beats) (format t \"heard~%\") (finish-output))))"
     );
-    // Nobody hears a datagram before the link is open.
+    // A datagram is lost before the link is open.
     hears_again("durable-mavlink", &text, || {
         let (stop, stopped) = std::sync::mpsc::channel::<()>();
         std::thread::spawn(move || {
