@@ -80,6 +80,16 @@ pub(crate) fn is_standard(symbol: &Symbol) -> bool {
     (symbol.is_in("COMMON-LISP") || symbol.is_in("ESL")) && parents_of_standard(symbol.name()).is_some()
 }
 
+/// Whether a clause for a cause may take programming errors: a value of a wrong type, a division by zero.
+pub(crate) fn may_be_mistake(forms: &CoreForms, cause: &Symbol) -> bool {
+    let is_changed = || forms.parents.keys().any(|known| known.is_keyword() && is_mistake(known.name()));
+    !cause.is_keyword() || is_mistake(cause.name()) || is_changed()
+}
+
+fn is_mistake(name: &str) -> bool {
+    name == "T" || parents_of_standard(name).is_some()
+}
+
 /// Returns the condition type whose failures have this cause.
 pub(crate) fn condition_of(forms: &CoreForms, cause: &Symbol) -> Option<Symbol> {
     if forms.parents.contains_key(cause) {

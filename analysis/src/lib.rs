@@ -6,7 +6,7 @@
 //! which failures leave which code, form and task. Functions of the library are known by tables
 //! (`library`); functions of the host by declarations, `(declaim (fails name cause*))`.
 //!
-//! `orders` finds resources that tasks take in different orders.
+//! `orders` finds resources that tasks take in different orders, `types` calls that cannot succeed.
 //!
 //! Guarantees: a failure that leaves a task in a run is in the table, apart from the cases that the chapter
 //! "Possible failures" of the manual lists. Not here: reading files, printing.
@@ -34,6 +34,7 @@ mod row;
 mod solve;
 mod table;
 mod taken;
+mod types;
 mod value;
 
 pub mod render;
@@ -88,11 +89,13 @@ pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -
     let numbers = table::numbers_of(&flow);
     let maker = Maker { flow: &flow, solution: &solution, sources, all: options.all, numbers };
     let explanation = options.explained.as_ref().map(|cause| maker.explain(cause)).unwrap_or_default();
-    (maker.table(), explanation)
+    let mut table = maker.table();
+    table.findings.extend(types::findings(&forms, sources));
+    (table, explanation)
 }
 
 /// Codes of the warnings of an analysis.
-pub const WARNINGS: [&str; 4] = ["clause-never-applies", "declared-never", "endless-retry", "resource-order"];
+pub const WARNINGS: [&str; 5] = esl_compiler::diagnostic::code::OF_ANALYSES;
 
 /// Leaves out the warnings of the compiler about clauses that merely fall off their ends if the program's
 /// functions show that control cannot reach these; to the others it adds the failures that the value of the

@@ -2,7 +2,7 @@
 //! procedure is in the table of the program.
 #![allow(clippy::print_stderr, reason = "long runs show their findings at once")]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
@@ -12,6 +12,7 @@ use esl::module_path::ModulePath;
 use esl::program::{Program, Source, compile_with_core, finish, load, machine, run_in, set_module_path};
 use esl_analysis::{AnalysisOptions, CauseRow, FailureTable, TaskKind, analyze};
 use esl_bytecode::datum::Datum;
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_vm::observe::{Observer, Seen};
@@ -26,6 +27,8 @@ struct Log {
     /// Name, whether it is hidden, and cause of tasks that a failure has ended.
     ended: Vec<(String, bool, String)>,
     recovered: Vec<String>,
+    /// Whether a programming error has been seen.
+    has_error: bool,
 }
 
 struct Onlooker(Arc<Mutex<Log>>);
@@ -35,7 +38,10 @@ impl Observer for Onlooker {
         let Ok(mut log) = self.0.lock() else { return };
         match seen {
             Seen::Begins { name, is_hidden } => _ = log.names.insert(task, (name.into(), is_hidden)),
-            Seen::Fails(cause) => _ = log.failing.insert(task, cause.to_lowercase()),
+            Seen::Fails(cause) => {
+                log.has_error |= STANDARD.contains(&cause.to_lowercase().as_str());
+                log.failing.insert(task, cause.to_lowercase());
+            }
             Seen::Recovers(cause) => log.recovered.push(cause.to_lowercase()),
             Seen::Ends("failed") => {
                 let (name, is_hidden) = log.names.get(&task).cloned().unwrap_or_default();
@@ -43,6 +49,53 @@ impl Observer for Onlooker {
                 log.ended.push((name, is_hidden, cause));
             }
             _ => {}
+        }
+    }
+}
+
+/// The failures that a table says clauses take, and those that it says end tasks, without programming errors
+/// and causes that are not known.
+fn inferred(table: &FailureTable) -> BTreeSet<(&'static str, String)> {
+    let is_named = |row: &&CauseRow| !row.is_mistake && row.cause.starts_with(':');
+    let taken = table.clauses.iter().flat_map(|clause| &clause.causes);
+    let ending = table.tasks.iter().flat_map(|task| &task.causes);
+    let taken = taken.filter(is_named).map(|row| ("a clause takes", row.cause.clone()));
+    taken.chain(ending.filter(is_named).map(|row| ("a task ends by", row.cause.clone()))).collect()
+}
+
+/// The failures that a run has shown clauses take, and those that ended tasks.
+fn shown(log: &Log) -> BTreeSet<(&'static str, String)> {
+    let taken = log.recovered.iter().map(|cause| ("a clause takes", cause.clone()));
+    taken.chain(log.ended.iter().map(|(_, _, cause)| ("a task ends by", cause.clone()))).collect()
+}
+
+/// How many inferred failures runs have shown.
+#[derive(Default)]
+struct Precision {
+    inferred: usize,
+    shown: usize,
+    /// Those that no run has shown, with the number of programs.
+    others: BTreeMap<(&'static str, String), usize>,
+}
+
+impl Precision {
+    fn add(&mut self, inferred: BTreeSet<(&'static str, String)>, shown: &BTreeSet<(&'static str, String)>) {
+        self.inferred += inferred.len();
+        for pair in inferred {
+            if shown.contains(&pair) {
+                self.shown += 1;
+            } else {
+                *self.others.entry(pair).or_default() += 1;
+            }
+        }
+    }
+
+    fn tell(&self, runs: &str) {
+        eprintln!("{runs} have shown {} of {} inferred failures; the others:", self.shown, self.inferred);
+        let mut others: Vec<_> = self.others.iter().collect();
+        others.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
+        for ((what, cause), count) in others {
+            eprintln!("{count:6} {what} {cause}");
         }
     }
 }
@@ -92,8 +145,9 @@ const STANDARD: [&str; 30] = [
     ":floating-point-underflow",
 ];
 
-/// Runs a program. Returns the failures that its table lacks, and the number of those that were seen.
-fn misses(path: &Path) -> Option<(Vec<String>, usize)> {
+/// Runs a program. Returns the failures that its table lacks, and the number of those that were seen. A
+/// program that is warned of fails as the warning says.
+fn misses(path: &Path, precision: &mut Precision) -> Option<(Vec<String>, usize)> {
     let text = std::fs::read_to_string(path).ok()?;
     let sources = [Source::new(path.to_string_lossy(), text)];
     let modules = ModulePath::new(std::iter::once(path), &[]);
@@ -109,7 +163,13 @@ fn misses(path: &Path) -> Option<(Vec<String>, usize)> {
     machine.inbox().inspect(esl::host::Inspection::Watch);
     run_in(&mut machine, &program).ok()?;
     let log = log.lock().ok()?;
-    Some(compare(&table, &log))
+    let (mut missed, seen) = compare(&table, &log);
+    precision.add(inferred(&table), &shown(&log));
+    let is_of_types = |found: &&Diagnostic| found.code == "wrong-type" && !log.has_error;
+    missed.extend(
+        table.findings.iter().filter(is_of_types).map(|found| format!("warned of: {}", found.message)),
+    );
+    Some((missed, seen))
 }
 
 fn compare(table: &FailureTable, log: &Log) -> (Vec<String>, usize) {
@@ -153,14 +213,16 @@ fn failures_that_are_seen_are_in_the_table() {
     let programs = esl_conformance::programs::paths("");
     let paths: Vec<PathBuf> = programs.into_iter().step_by(stride).collect();
     let (mut runs, mut seen, mut missed) = (0, 0, Vec::new());
+    let mut precision = Precision::default();
     for path in paths {
-        if let Some((misses, count)) = misses(&path) {
+        if let Some((misses, count)) = misses(&path, &mut precision) {
             runs += 1;
             seen += count;
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             missed.extend(misses.iter().map(|miss| format!("{name}: {miss}")));
         }
     }
+    precision.tell("programs");
     assert!(runs > 20 && seen > 10, "{runs} runs with {seen} failures are too few");
     assert!(missed.is_empty(), "{} of {seen} in {runs} runs:\n{}", missed.len(), missed.join("\n"));
 }
@@ -231,9 +293,11 @@ impl InjectedProgram {
 fn failures_after_injected_faults_are_in_the_table() {
     let span = Span::default();
     let (mut runs, mut seen, mut missed) = (0, 0, Vec::new());
+    let mut precision = Precision::default();
     for (file, test) in INJECTED {
         let subject = InjectedProgram::new(file, test);
         let known = subject.table.causes_by_name();
+        let mut all_shown = BTreeSet::new();
         let (_, mut operations) = subject.run(&Datum::nil(span));
         operations.sort_by_key(|operation| operation.name().to_string());
         operations.dedup();
@@ -253,6 +317,7 @@ fn failures_after_injected_faults_are_in_the_table() {
                         Datum::list(vec![name, Datum::integer(1, span), lasts, way, arguments.clone()], span);
                     let (log, _) = subject.run(&Datum::list(vec![fault], span));
                     let (misses, count) = compare(&subject.table, &log);
+                    all_shown.extend(shown(&log));
                     runs += 1;
                     seen += count;
                     let misses =
@@ -261,7 +326,9 @@ fn failures_after_injected_faults_are_in_the_table() {
                 }
             }
         }
+        precision.add(inferred(&subject.table), &all_shown);
     }
+    precision.tell("runs with faults");
     assert!(runs > 50 && seen > 100, "{runs} runs with {seen} failures are too few");
     assert!(missed.is_empty(), "{} of {seen} in {runs} runs:\n{}", missed.len(), missed.join("\n"));
 }

@@ -7,6 +7,7 @@ use esl::module_path::ModulePath;
 use esl::program::{Source, compile_with_core};
 use esl_analysis::render::{TableFormat, render, render_graph};
 use esl_analysis::{AnalysisOptions, FailureTable, analyze};
+use esl_conformance::folder::Folder;
 
 /// Returns the table of a program of this repository, and the explanation of a cause.
 fn table_of(program: &str, options: &AnalysisOptions) -> (FailureTable, String) {
@@ -82,4 +83,99 @@ fn the_chapter_shows_true_tables() {
         std::fs::write(&path, &changed).expect("the chapter can be written");
     }
     assert_eq!(chapter, changed, "`ESL_BLESS=1` writes the tables of the chapter anew");
+}
+
+/// Returns the lines of the table of a program of `folder`, without numbers of lines; in the file `changed`,
+/// the text `old` is replaced.
+fn lines_with(folder: &str, program: &str, changed: &str, old: &str, new: &str) -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the package is in the workspace");
+    let copy = Folder::new(&format!("mutated-{program}-{}", old.len() + new.len()));
+    for entry in root.join(folder).read_dir().expect("the folder can be listed") {
+        let path = entry.expect("the folder can be listed").path();
+        let name = path.file_name().expect("it has a name").to_string_lossy().to_string();
+        if name.ends_with(".esl") {
+            let text = std::fs::read_to_string(&path).expect("the program can be read");
+            assert!(name != changed || text.matches(old).count() == 1, "{old} is in {changed}, once");
+            copy.file(&name, if name == changed { text.replace(old, new) } else { text });
+        }
+    }
+    let path = copy.path().join(program);
+    let text = std::fs::read_to_string(&path).expect("the program can be read");
+    let modules = ModulePath::new(std::iter::once(path.as_path()), &[]);
+    let mut compiled = compile_with_core(&[Source::new(program, text)], &modules);
+    assert!(!compiled.has_errors(), "{program} compiles: {:?}", compiled.diagnostics);
+    let cores = std::mem::take(&mut compiled.core);
+    let (table, _) = analyze(cores, &compiled.sources, &AnalysisOptions::default());
+    let text = render(&table, TableFormat::Text).replace(&format!("{}/", copy.path().display()), "");
+    let line = |line: &str| {
+        // The numbers of lines follow colons.
+        let mut parts = line.split(".esl:");
+        let mut shown = parts.next().unwrap_or_default().to_string();
+        for part in parts {
+            shown.push_str(part.trim_start_matches(|c: char| c.is_ascii_digit()));
+        }
+        shown.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    text.lines().map(line).collect()
+}
+
+/// Returns the lines that a change of a program takes from its table, and those that it adds.
+fn change(folder: &str, (program, changed): (&str, &str), old: &str, new: &str) -> Vec<String> {
+    let before = lines_with(folder, program, changed, old, old);
+    let after = lines_with(folder, program, changed, old, new);
+    let surplus = |all: &[String], other: &[String]| {
+        let mut left = other.to_vec();
+        let mut surplus = Vec::new();
+        for line in all {
+            match left.iter().position(|known| known == line) {
+                Some(place) => _ = left.remove(place),
+                None => surplus.push(line.clone()),
+            }
+        }
+        surplus
+    };
+    let lost = surplus(&before, &after).into_iter().map(|line| format!("- {line}"));
+    let added = surplus(&after, &before).into_iter().map(|line| format!("+ {line}"));
+    lost.chain(added).collect()
+}
+
+#[test]
+fn a_change_of_a_program_changes_its_table_by_just_that() {
+    let craft = |old, new| change("examples/spacecraft", ("scripted.esl", "executive.esl"), old, new);
+    let mission = |old, new| change("examples/missions", ("safe-drive.esl", "safe-drive.esl"), old, new);
+    // Without a clause, nothing takes its failure there.
+    let clause = craft("(:blurred :retries 2 (retry))", "");
+    // Without a limit, the failure no longer goes outward.
+    let limit = craft("(:blurred :retries 2", "(:blurred :retries :infinite");
+    // A cleanup without failures has no row; one with a failure has.
+    let cleanup = "(setf *takes-pictures* nil)))\n\n(defun downlink";
+    let harmless = craft(cleanup, "nil))\n\n(defun downlink");
+    let failing = mission("(setf motors nil))\n  (incf", "(fail :motor-on))\n  (incf");
+    let limited = "- in take-picture (executive): begins again, at most 2 times; then outward";
+    let blurred = "- :blurred from expose (scripted)";
+    assert_eq!(clause, [limited, blurred]);
+    assert_eq!(limit, [limited, blurred, blurred, "+ in take-picture (executive): begins again"]);
+    assert_eq!(harmless, [""; 0]);
+    let motor = "+ :motor-on from drive (safe-drive)";
+    let expected = [
+        "- task main: no failure ends it",
+        "- task drive (safe-drive): no failure ends it",
+        "- task mock drive (safe-drive): no failure ends it",
+        "- no failure leaves: note, rule, verdict, safe-drive, drive, take-picture",
+        "+ task main: a failure ends the run",
+        "+ ends by",
+        motor,
+        "+ task drive (safe-drive): a failure ends the task; its form takes that",
+        "+ ends by",
+        motor,
+        "+ task mock drive (safe-drive): a failure is the failure of the operation",
+        "+ ends by",
+        motor,
+        "+ function safe-drive (safe-drive)",
+        motor,
+        "+ function drive (safe-drive)",
+        motor,
+        "+ no failure leaves: note, rule, verdict, take-picture",
+    ];
+    assert_eq!(failing, expected);
 }

@@ -2,9 +2,11 @@
 //!
 //! A row is: the path of the implementation below `builtins` of the virtual machine, the home package (`cl`,
 //! `esl`, or `internal` for the library's own use), the name, and the lambda list; what a call shares with
-//! other tasks ([`Shares`]); `-> one` if the compiler counts on exactly one value; and for a builtin with a
-//! limit of work, the ESL function that takes over from it. The compiler takes names and arities from
-//! here, the virtual machine its table of implementations, `help` and the reference their text.
+//! other tasks ([`Shares`]); `-> one` if the compiler counts on exactly one value; `gives` and the type of
+//! the first value; `tests` and the type that a predicate tests for; and for a builtin with a limit of work,
+//! the ESL function that takes over from it. The compiler takes names and arities from here, analyses the
+//! types of values, the virtual machine its table of implementations, `help` and the reference their text.
+//! The types of arguments follow from the names of parameters: see [`crate::kind`].
 //!
 //! Builtins take required, optional and rest arguments only; functions with keyword arguments are written in
 //! ESL.
@@ -19,6 +21,7 @@ use std::sync::LazyLock;
 use rustc_hash::FxHashMap;
 
 use crate::compile::Arity;
+use crate::kind::ValueType;
 use crate::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
 
 /// Package and visibility of a builtin's name.
@@ -81,6 +84,10 @@ pub struct BuiltinInfo {
     pub shares: Shares,
     /// Whether the compiler may take a call of it for a form with exactly one value.
     pub returns_one: bool,
+    /// The type of its first value, if the row says that: no call ever has a value of another type.
+    pub gives: Option<ValueType>,
+    /// The type that it tests its only argument for: it is true of the values of this type, and of no others.
+    pub tests: Option<ValueType>,
     /// The ESL function, internal to the package `ESL`, that takes over when the work is above a builtin's
     /// limit.
     pub slowly: Option<&'static str>,
@@ -194,9 +201,80 @@ macro_rules! returns_one {
     };
 }
 
+/// The type that a word of the table stands for; of two words, either.
+macro_rules! value_type {
+    () => {
+        None
+    };
+    ($word:ident) => {
+        Some(value_type!(@ $word))
+    };
+    ($word:ident $or:ident) => {
+        Some(value_type!(@ $word).or(value_type!(@ $or)))
+    };
+    (@ nil) => {
+        ValueType::NIL
+    };
+    (@ boolean) => {
+        ValueType::SYMBOL
+    };
+    (@ symbol) => {
+        ValueType::SYMBOL
+    };
+    (@ integer) => {
+        ValueType::INTEGER
+    };
+    (@ rational) => {
+        ValueType::RATIONAL
+    };
+    (@ float) => {
+        ValueType::FLOAT
+    };
+    (@ real) => {
+        ValueType::REAL
+    };
+    (@ complex) => {
+        ValueType::COMPLEX
+    };
+    (@ number) => {
+        ValueType::NUMBER
+    };
+    (@ character) => {
+        ValueType::CHARACTER
+    };
+    (@ string) => {
+        ValueType::STRING
+    };
+    (@ pair) => {
+        ValueType::PAIR
+    };
+    (@ atom) => {
+        ValueType::ANY.without(ValueType::PAIR)
+    };
+    (@ list) => {
+        ValueType::LIST
+    };
+    (@ vector) => {
+        ValueType::OTHER_ARRAY
+    };
+    (@ array) => {
+        ValueType::ARRAY
+    };
+    (@ sequence) => {
+        ValueType::SEQUENCE
+    };
+    (@ table) => {
+        ValueType::TABLE
+    };
+    (@ stream) => {
+        ValueType::STREAM
+    };
+}
+
 macro_rules! define_builtins {
     ($( $(#[doc = $doc:literal])* $id:ident = $native:path, $visibility:ident $name:literal
-        ($lambda_list:literal) shares $shares:ident $(-> $results:ident)? $(slowly $slowly:literal)?; )*) => {
+        ($lambda_list:literal) shares $shares:ident $(-> $results:ident)?
+        $(gives $gives:ident $(or $or:ident)?)? $(tests $tests:ident)? $(slowly $slowly:literal)?; )*) => {
         /// A function that is written in Rust.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u16)]
@@ -214,6 +292,8 @@ macro_rules! define_builtins {
                 arity: arity_of($lambda_list),
                 shares: shares!($shares),
                 returns_one: returns_one!($($results)?),
+                gives: value_type!($($gives $($or)?)?),
+                tests: value_type!($($tests)?),
                 slowly: slowly!($($slowly)?),
                 doc: &[$( $doc ),*],
             }, )*
@@ -288,212 +368,237 @@ macro_rules! for_each_builtin {
 
             // ---- identity and types
             /// Whether both are the same object.
-            Eq = equality::eq, cl "EQ" ("left right") shares nothing -> one;
+            Eq = equality::eq, cl "EQ" ("left right") shares nothing -> one gives boolean;
             /// Whether both are the same object, or equal numbers of one type, or equal characters.
-            Eql = equality::eql, cl "EQL" ("left right") shares nothing -> one;
+            Eql = equality::eql, cl "EQL" ("left right") shares nothing -> one gives boolean;
             /// Whether `object` is `NIL`.
-            Not = types::null, cl "NOT" ("object") shares nothing -> one;
+            Not = types::null, cl "NOT" ("object") shares nothing -> one gives boolean tests nil;
             /// Whether `object` is `NIL`.
-            Null = types::null, cl "NULL" ("object") shares nothing -> one;
+            Null = types::null, cl "NULL" ("object") shares nothing -> one gives boolean tests nil;
             /// Whether `object` is a pair.
-            Consp = types::consp, cl "CONSP" ("object") shares nothing -> one;
+            Consp = types::consp, cl "CONSP" ("object") shares nothing -> one gives boolean tests pair;
             /// Whether `object` is anything but a pair.
-            Atom = types::atom, cl "ATOM" ("object") shares nothing -> one;
+            Atom = types::atom, cl "ATOM" ("object") shares nothing -> one gives boolean tests atom;
             /// Whether `object` is a pair or `NIL`.
-            Listp = types::listp, cl "LISTP" ("object") shares nothing -> one;
+            Listp = types::listp, cl "LISTP" ("object") shares nothing -> one gives boolean tests list;
             /// Whether `object` is a symbol.
-            Symbolp = types::symbolp, cl "SYMBOLP" ("object") shares nothing -> one;
+            Symbolp = types::symbolp, cl "SYMBOLP" ("object")
+                shares nothing -> one gives boolean tests symbol;
             /// Whether `object` is a keyword.
-            Keywordp = types::keywordp, cl "KEYWORDP" ("object") shares nothing -> one;
+            Keywordp = types::keywordp, cl "KEYWORDP" ("object") shares nothing -> one gives boolean;
             /// Whether `object` is a number.
-            Numberp = types::numberp, cl "NUMBERP" ("object") shares nothing -> one;
+            Numberp = types::numberp, cl "NUMBERP" ("object")
+                shares nothing -> one gives boolean tests number;
             /// Whether `object` is an integer, a ratio or a float.
-            Realp = types::realp, cl "REALP" ("object") shares nothing -> one;
+            Realp = types::realp, cl "REALP" ("object") shares nothing -> one gives boolean tests real;
             /// Whether `object` is a complex number.
-            Complexp = number::complexp, cl "COMPLEXP" ("object") shares nothing;
+            Complexp = number::complexp, cl "COMPLEXP" ("object") shares nothing gives boolean tests complex;
             /// Whether `object` is an integer or a ratio.
-            Rationalp = types::rationalp, cl "RATIONALP" ("object") shares nothing -> one;
+            Rationalp = types::rationalp, cl "RATIONALP" ("object")
+                shares nothing -> one gives boolean tests rational;
             /// Whether `object` is an integer.
-            Integerp = types::integerp, cl "INTEGERP" ("object") shares nothing -> one;
+            Integerp = types::integerp, cl "INTEGERP" ("object")
+                shares nothing -> one gives boolean tests integer;
             /// Whether `object` is a float.
-            Floatp = types::floatp, cl "FLOATP" ("object") shares nothing -> one;
+            Floatp = types::floatp, cl "FLOATP" ("object") shares nothing -> one gives boolean tests float;
             /// Whether `object` is a character.
-            Characterp = types::characterp, cl "CHARACTERP" ("object") shares nothing -> one;
+            Characterp = types::characterp, cl "CHARACTERP" ("object")
+                shares nothing -> one gives boolean tests character;
             /// Whether `object` is a string.
-            Stringp = types::stringp, cl "STRINGP" ("object") shares nothing -> one;
+            Stringp = types::stringp, cl "STRINGP" ("object")
+                shares nothing -> one gives boolean tests string;
             /// Whether `object` is an array of rank 1.
-            Vectorp = types::vectorp, cl "VECTORP" ("object") shares nothing -> one;
+            Vectorp = types::vectorp, cl "VECTORP" ("object") shares nothing -> one gives boolean;
             /// Whether `object` is a simple general vector.
-            SimpleVectorp = types::simple_vector_p, cl "SIMPLE-VECTOR-P" ("object") shares nothing -> one;
+            SimpleVectorp = types::simple_vector_p, cl "SIMPLE-VECTOR-P" ("object")
+                shares nothing -> one gives boolean;
             /// Whether `object` is an array.
-            Arrayp = types::arrayp, cl "ARRAYP" ("object") shares nothing -> one;
+            Arrayp = types::arrayp, cl "ARRAYP" ("object") shares nothing -> one gives boolean tests array;
             /// Whether `object` is a function.
-            Functionp = types::functionp, cl "FUNCTIONP" ("object") shares nothing -> one;
+            Functionp = types::functionp, cl "FUNCTIONP" ("object") shares nothing -> one gives boolean;
             /// Whether `object` is a hash table.
-            HashTablep = types::hash_table_p, cl "HASH-TABLE-P" ("object") shares nothing -> one;
+            HashTablep = types::hash_table_p, cl "HASH-TABLE-P" ("object")
+                shares nothing -> one gives boolean tests table;
             /// Whether both are equal numbers or characters, strings of the same characters, or pairs of
             /// equal parts.
-            Equal = equality::equal, cl "EQUAL" ("left right") shares nothing slowly "%SLOW-EQUAL";
+            Equal = equality::equal, cl "EQUAL" ("left right")
+                shares nothing gives boolean slowly "%SLOW-EQUAL";
             /// Whether both look alike: as `equal`, but case and the type of numbers do not matter, and
             /// arrays, structures and hash tables are compared by their parts.
-            Equalp = equality::equalp, cl "EQUALP" ("left right") shares nothing slowly "%SLOW-EQUALP";
+            Equalp = equality::equalp, cl "EQUALP" ("left right")
+                shares nothing gives boolean slowly "%SLOW-EQUALP";
             /// A number that `equal` objects share.
-            Sxhash = equality::sxhash, cl "SXHASH" ("object") shares nothing;
+            Sxhash = equality::sxhash, cl "SXHASH" ("object") shares nothing gives integer;
             /// Whether `object` is a string without a fill pointer.
-            SimpleStringp = types::simple_string_p, cl "SIMPLE-STRING-P" ("object") shares nothing;
+            SimpleStringp = types::simple_string_p, cl "SIMPLE-STRING-P" ("object")
+                shares nothing gives boolean;
 
             // ---- numbers
             /// The sum; 0 of no numbers.
-            Add = number::add, cl "+" ("&rest numbers") shares nothing -> one slowly "%SLOW-+";
+            Add = number::add, cl "+" ("&rest numbers") shares nothing -> one gives number slowly "%SLOW-+";
             /// The first number less the others; the negative of a single one.
             Subtract = number::subtract, cl "-" ("number &rest numbers")
-                shares nothing -> one slowly "%SLOW--";
+                shares nothing -> one gives number slowly "%SLOW--";
             /// The product; 1 of no numbers.
-            Multiply = number::multiply, cl "*" ("&rest numbers") shares nothing -> one slowly "%SLOW-*";
+            Multiply = number::multiply, cl "*" ("&rest numbers")
+                shares nothing -> one gives number slowly "%SLOW-*";
             /// The first number divided by the others; the reciprocal of a single one. Exact for integers and
             /// ratios. Fails with `:division-by-zero`.
-            Divide = number::divide, cl "/" ("number &rest numbers") shares nothing -> one slowly "%SLOW-/";
+            Divide = number::divide, cl "/" ("number &rest numbers")
+                shares nothing -> one gives number slowly "%SLOW-/";
             /// `number` plus one.
-            Increment = number::increment, cl "1+" ("number") shares nothing -> one slowly "%SLOW-1+";
+            Increment = number::increment, cl "1+" ("number")
+                shares nothing -> one gives number slowly "%SLOW-1+";
             /// `number` less one.
-            Decrement = number::decrement, cl "1-" ("number") shares nothing -> one slowly "%SLOW-1-";
+            Decrement = number::decrement, cl "1-" ("number")
+                shares nothing -> one gives number slowly "%SLOW-1-";
             /// Quotient rounded towards minus infinity, and remainder. Fails with `:division-by-zero`.
             Floor = number::floor, cl "FLOOR" ("number &optional divisor")
-                shares nothing slowly "%SLOW-FLOOR";
+                shares nothing gives integer slowly "%SLOW-FLOOR";
             /// Quotient rounded towards plus infinity, and remainder. Fails with `:division-by-zero`.
             Ceiling = number::ceiling, cl "CEILING" ("number &optional divisor")
-                shares nothing slowly "%SLOW-CEILING";
+                shares nothing gives integer slowly "%SLOW-CEILING";
             /// Quotient rounded towards zero, and remainder. Fails with `:division-by-zero`.
             Truncate = number::truncate, cl "TRUNCATE" ("number &optional divisor")
-                shares nothing slowly "%SLOW-TRUNCATE";
+                shares nothing gives integer slowly "%SLOW-TRUNCATE";
             /// Quotient rounded to the nearest integer, halves to the even one, and remainder. Fails with
             /// `:division-by-zero`.
             Round = number::round, cl "ROUND" ("number &optional divisor")
-                shares nothing slowly "%SLOW-ROUND";
+                shares nothing gives integer slowly "%SLOW-ROUND";
             /// The remainder of `floor`.
-            Mod = number::modulo, cl "MOD" ("number divisor") shares nothing -> one slowly "%SLOW-MOD";
+            Mod = number::modulo, cl "MOD" ("number divisor")
+                shares nothing -> one gives number slowly "%SLOW-MOD";
             /// The remainder of `truncate`.
-            Rem = number::remainder, cl "REM" ("number divisor") shares nothing -> one slowly "%SLOW-REM";
+            Rem = number::remainder, cl "REM" ("number divisor")
+                shares nothing -> one gives number slowly "%SLOW-REM";
             /// Bitwise "and" of the integers; -1 of none.
             LogAnd = integer::logand, cl "LOGAND" ("&rest integers")
-                shares nothing -> one slowly "%SLOW-LOGAND";
+                shares nothing -> one gives integer slowly "%SLOW-LOGAND";
             /// Bitwise "or" of the integers; 0 of none.
             LogIor = integer::logior, cl "LOGIOR" ("&rest integers")
-                shares nothing -> one slowly "%SLOW-LOGIOR";
+                shares nothing -> one gives integer slowly "%SLOW-LOGIOR";
             /// Bitwise "exclusive or" of the integers; 0 of none.
             LogXor = integer::logxor, cl "LOGXOR" ("&rest integers")
-                shares nothing -> one slowly "%SLOW-LOGXOR";
+                shares nothing -> one gives integer slowly "%SLOW-LOGXOR";
             /// `integer` shifted left by `count` bits, right if that is negative.
-            Ash = integer::ash, cl "ASH" ("integer count") shares nothing -> one;
+            Ash = integer::ash, cl "ASH" ("integer count") shares nothing -> one gives integer;
             /// Whether all numbers are equal.
             NumEqual = number::num_equal, cl "=" ("number &rest numbers")
-                shares nothing -> one slowly "%SLOW-=";
+                shares nothing -> one gives boolean slowly "%SLOW-=";
             /// Whether no two numbers are equal.
             NumNotEqual = number::num_not_equal, cl "/=" ("number &rest numbers")
-                shares nothing -> one slowly "%SLOW-/=";
+                shares nothing -> one gives boolean slowly "%SLOW-/=";
             /// Whether the numbers increase.
-            Less = number::less, cl "<" ("number &rest numbers") shares nothing -> one slowly "%SLOW-<";
+            Less = number::less, cl "<" ("number &rest numbers")
+                shares nothing -> one gives boolean slowly "%SLOW-<";
             /// Whether the numbers never decrease.
             LessEqual = number::less_equal, cl "<=" ("number &rest numbers")
-                shares nothing -> one slowly "%SLOW-<=";
+                shares nothing -> one gives boolean slowly "%SLOW-<=";
             /// Whether the numbers decrease.
-            Greater = number::greater, cl ">" ("number &rest numbers") shares nothing -> one slowly "%SLOW->";
+            Greater = number::greater, cl ">" ("number &rest numbers")
+                shares nothing -> one gives boolean slowly "%SLOW->";
             /// Whether the numbers never increase.
             GreaterEqual = number::greater_equal, cl ">=" ("number &rest numbers")
-                shares nothing -> one slowly "%SLOW->=";
+                shares nothing -> one gives boolean slowly "%SLOW->=";
             /// Whether `number` is zero.
-            Zerop = number::zerop, cl "ZEROP" ("number") shares nothing -> one;
+            Zerop = number::zerop, cl "ZEROP" ("number") shares nothing -> one gives boolean;
             /// Whether `number` is above zero.
-            Plusp = number::plusp, cl "PLUSP" ("number") shares nothing -> one;
+            Plusp = number::plusp, cl "PLUSP" ("number") shares nothing -> one gives boolean;
             /// Whether `number` is below zero.
-            Minusp = number::minusp, cl "MINUSP" ("number") shares nothing -> one;
+            Minusp = number::minusp, cl "MINUSP" ("number") shares nothing -> one gives boolean;
             /// The greatest of the numbers.
-            Max = number::max, cl "MAX" ("number &rest numbers") shares nothing slowly "%SLOW-MAX";
+            Max = number::max, cl "MAX" ("number &rest numbers")
+                shares nothing gives number slowly "%SLOW-MAX";
             /// The least of the numbers.
-            Min = number::min, cl "MIN" ("number &rest numbers") shares nothing slowly "%SLOW-MIN";
+            Min = number::min, cl "MIN" ("number &rest numbers")
+                shares nothing gives number slowly "%SLOW-MIN";
             /// The number without its sign.
-            Abs = number::abs, cl "ABS" ("number") shares nothing slowly "%SLOW-ABS";
+            Abs = number::abs, cl "ABS" ("number") shares nothing gives number slowly "%SLOW-ABS";
             /// -1, 0 or 1, as `number` is below, at or above zero, as a number of its type.
-            Signum = number::signum, cl "SIGNUM" ("number") shares nothing slowly "%SLOW-SIGNUM";
+            Signum = number::signum, cl "SIGNUM" ("number") shares nothing gives number slowly "%SLOW-SIGNUM";
             /// The complex number with these parts, which are two rationals or two floats.
             MakeComplex = number::make_complex, internal "%MAKE-COMPLEX" ("real-part imaginary-part")
                 shares nothing;
             /// The real part of a number.
-            Realpart = number::real_part, cl "REALPART" ("number") shares nothing;
+            Realpart = number::real_part, cl "REALPART" ("number") shares nothing gives number;
             /// The imaginary part of a number.
-            Imagpart = number::imaginary_part, cl "IMAGPART" ("number") shares nothing;
+            Imagpart = number::imaginary_part, cl "IMAGPART" ("number") shares nothing gives number;
             /// As `floor`, with the quotient as a float.
             FFloor = number::ffloor, cl "FFLOOR" ("number &optional divisor")
-                shares nothing slowly "%SLOW-FFLOOR";
+                shares nothing gives number slowly "%SLOW-FFLOOR";
             /// As `ceiling`, with the quotient as a float.
             FCeiling = number::fceiling, cl "FCEILING" ("number &optional divisor")
-                shares nothing slowly "%SLOW-FCEILING";
+                shares nothing gives number slowly "%SLOW-FCEILING";
             /// As `truncate`, with the quotient as a float.
-            FTruncate = number::ftruncate, cl "FTRUNCATE" ("number &optional divisor") shares nothing
-                slowly "%SLOW-FTRUNCATE";
+            FTruncate = number::ftruncate, cl "FTRUNCATE" ("number &optional divisor")
+                shares nothing gives number slowly "%SLOW-FTRUNCATE";
             /// As `round`, with the quotient as a float.
             FRound = number::fround, cl "FROUND" ("number &optional divisor")
-                shares nothing slowly "%SLOW-FROUND";
+                shares nothing gives number slowly "%SLOW-FROUND";
             /// `base` to the power of `power`: exact for rationals and integer powers.
-            Expt = float::expt, cl "EXPT" ("base power") shares nothing slowly "%SLOW-EXPT";
+            Expt = float::expt, cl "EXPT" ("base power") shares nothing gives number slowly "%SLOW-EXPT";
             /// The square root, a float; that of a negative number is complex.
-            Sqrt = float::sqrt, cl "SQRT" ("number") shares nothing slowly "%SLOW-SQRT";
+            Sqrt = float::sqrt, cl "SQRT" ("number") shares nothing gives number slowly "%SLOW-SQRT";
             /// e to the power of `number`.
-            Exp = float::exp, cl "EXP" ("number") shares nothing slowly "%SLOW-EXP";
+            Exp = float::exp, cl "EXP" ("number") shares nothing gives number slowly "%SLOW-EXP";
             /// The logarithm, natural unless a base is given; that of a negative number is complex.
-            Log = float::log, cl "LOG" ("number &optional base") shares nothing slowly "%SLOW-LOG";
+            Log = float::log, cl "LOG" ("number &optional base")
+                shares nothing gives number slowly "%SLOW-LOG";
             /// The sine.
-            Sin = float::sin, cl "SIN" ("radians") shares nothing slowly "%SLOW-SIN";
+            Sin = float::sin, cl "SIN" ("radians") shares nothing gives number slowly "%SLOW-SIN";
             /// The cosine.
-            Cos = float::cos, cl "COS" ("radians") shares nothing slowly "%SLOW-COS";
+            Cos = float::cos, cl "COS" ("radians") shares nothing gives number slowly "%SLOW-COS";
             /// The tangent.
-            Tan = float::tan, cl "TAN" ("radians") shares nothing slowly "%SLOW-TAN";
+            Tan = float::tan, cl "TAN" ("radians") shares nothing gives number slowly "%SLOW-TAN";
             /// The angle with this sine.
-            Asin = float::asin, cl "ASIN" ("number") shares nothing slowly "%SLOW-ASIN";
+            Asin = float::asin, cl "ASIN" ("number") shares nothing gives number slowly "%SLOW-ASIN";
             /// The angle with this cosine.
-            Acos = float::acos, cl "ACOS" ("number") shares nothing slowly "%SLOW-ACOS";
+            Acos = float::acos, cl "ACOS" ("number") shares nothing gives number slowly "%SLOW-ACOS";
             /// The angle with this tangent; of two arguments, the angle of the point with `number` above and
             /// `divisor` to the right.
-            Atan = float::atan, cl "ATAN" ("number &optional divisor") shares nothing slowly "%SLOW-ATAN";
+            Atan = float::atan, cl "ATAN" ("number &optional divisor")
+                shares nothing gives number slowly "%SLOW-ATAN";
             /// The hyperbolic sine.
-            Sinh = float::sinh, cl "SINH" ("number") shares nothing slowly "%SLOW-SINH";
+            Sinh = float::sinh, cl "SINH" ("number") shares nothing gives number slowly "%SLOW-SINH";
             /// The hyperbolic cosine.
-            Cosh = float::cosh, cl "COSH" ("number") shares nothing slowly "%SLOW-COSH";
+            Cosh = float::cosh, cl "COSH" ("number") shares nothing gives number slowly "%SLOW-COSH";
             /// The hyperbolic tangent.
-            Tanh = float::tanh, cl "TANH" ("number") shares nothing slowly "%SLOW-TANH";
+            Tanh = float::tanh, cl "TANH" ("number") shares nothing gives number slowly "%SLOW-TANH";
             /// The number with this hyperbolic sine.
-            Asinh = float::asinh, cl "ASINH" ("number") shares nothing slowly "%SLOW-ASINH";
+            Asinh = float::asinh, cl "ASINH" ("number") shares nothing gives number slowly "%SLOW-ASINH";
             /// The number with this hyperbolic cosine.
-            Acosh = float::acosh, cl "ACOSH" ("number") shares nothing slowly "%SLOW-ACOSH";
+            Acosh = float::acosh, cl "ACOSH" ("number") shares nothing gives number slowly "%SLOW-ACOSH";
             /// The number with this hyperbolic tangent.
-            Atanh = float::atanh, cl "ATANH" ("number") shares nothing slowly "%SLOW-ATANH";
+            Atanh = float::atanh, cl "ATANH" ("number") shares nothing gives number slowly "%SLOW-ATANH";
             /// The numerator, in lowest terms.
-            Numerator = float::numerator, cl "NUMERATOR" ("rational") shares nothing;
+            Numerator = float::numerator, cl "NUMERATOR" ("rational") shares nothing gives integer;
             /// The denominator, in lowest terms; 1 for an integer.
-            Denominator = float::denominator, cl "DENOMINATOR" ("rational") shares nothing;
+            Denominator = float::denominator, cl "DENOMINATOR" ("rational") shares nothing gives integer;
             /// The ratio of two integers that have no divisor in common; the second is above 1.
             MakeRatio = float::make_ratio, internal "%MAKE-RATIO" ("numerator denominator") shares nothing;
             /// The rational of exactly this value.
-            Rational = float::rational, cl "RATIONAL" ("number") shares nothing;
+            Rational = float::rational, cl "RATIONAL" ("number") shares nothing gives rational;
             /// The simplest rational that reads as this float.
-            Rationalize = float::rationalize, cl "RATIONALIZE" ("number") shares nothing;
+            Rationalize = float::rationalize, cl "RATIONALIZE" ("number") shares nothing gives rational;
             /// The nearest float.
-            Float = float::to_float, cl "FLOAT" ("number &optional prototype") shares nothing;
+            Float = float::to_float, cl "FLOAT" ("number &optional prototype") shares nothing gives float;
             /// Fraction from 0.5 to below 1, exponent, and sign as a float.
-            DecodeFloat = float::decode_float, cl "DECODE-FLOAT" ("float") shares nothing;
+            DecodeFloat = float::decode_float, cl "DECODE-FLOAT" ("float") shares nothing gives float;
             /// Mantissa, exponent and sign as integers.
             IntegerDecodeFloat = float::integer_decode_float, cl "INTEGER-DECODE-FLOAT" ("float")
-                shares nothing;
+                shares nothing gives integer;
             /// `float` times two to the power of `exponent`.
-            ScaleFloat = float::scale_float, cl "SCALE-FLOAT" ("float exponent") shares nothing;
+            ScaleFloat = float::scale_float, cl "SCALE-FLOAT" ("float exponent") shares nothing gives float;
             /// `magnitude`, which is 1.0 unless given, with the sign of `float`.
-            FloatSign = float::float_sign, cl "FLOAT-SIGN" ("float &optional magnitude") shares nothing;
+            FloatSign = float::float_sign, cl "FLOAT-SIGN" ("float &optional magnitude")
+                shares nothing gives float;
             /// Number of binary digits of the type of `float`.
-            FloatDigits = float::float_digits, cl "FLOAT-DIGITS" ("float") shares nothing;
+            FloatDigits = float::float_digits, cl "FLOAT-DIGITS" ("float") shares nothing gives integer;
             /// Base of the representation of floats.
-            FloatRadix = float::float_radix, cl "FLOAT-RADIX" ("float") shares nothing;
+            FloatRadix = float::float_radix, cl "FLOAT-RADIX" ("float") shares nothing gives integer;
             /// Number of significant binary digits of `float`.
-            FloatPrecision = float::float_precision, cl "FLOAT-PRECISION" ("float") shares nothing;
+            FloatPrecision = float::float_precision, cl "FLOAT-PRECISION" ("float")
+                shares nothing gives integer;
             /// The float as `prin1` writes it.
             FloatString = float::float_string, internal "%FLOAT-STRING" ("float") shares nothing;
             /// Where the point goes and the decimal digits of a float without its sign: the value is 0.digits
@@ -507,47 +612,49 @@ macro_rules! for_each_builtin {
             /// A number from 0 to below `limit`, of its type; moves `state` on.
             Random = float::random, internal "%RANDOM" ("limit state") shares variables;
             /// Whether `object` is a random state.
-            RandomStatep = types::random_state_p, cl "RANDOM-STATE-P" ("object") shares nothing;
+            RandomStatep = types::random_state_p, cl "RANDOM-STATE-P" ("object") shares nothing gives boolean;
 
             // ---- integers
             /// Whether `integer` is even.
-            Evenp = integer::evenp, cl "EVENP" ("integer") shares nothing;
+            Evenp = integer::evenp, cl "EVENP" ("integer") shares nothing gives boolean;
             /// Whether `integer` is odd.
-            Oddp = integer::oddp, cl "ODDP" ("integer") shares nothing;
+            Oddp = integer::oddp, cl "ODDP" ("integer") shares nothing gives boolean;
             /// The greatest common divisor; 0 of none.
-            Gcd = integer::gcd, cl "GCD" ("&rest integers") shares nothing slowly "%SLOW-GCD";
+            Gcd = integer::gcd, cl "GCD" ("&rest integers") shares nothing gives integer slowly "%SLOW-GCD";
             /// Two smaller integers with the same greatest common divisor as `left` and `right`; the second
             /// is 0 when the first is the divisor.
             GcdStep = integer::gcd_step, internal "%GCD-STEP" ("left right")
                 shares nothing slowly "%SLOW-GCD-STEP";
             /// The least common multiple; 1 of none.
-            Lcm = integer::lcm, cl "LCM" ("&rest integers") shares nothing slowly "%SLOW-LCM";
+            Lcm = integer::lcm, cl "LCM" ("&rest integers") shares nothing gives integer slowly "%SLOW-LCM";
             /// The greatest integer whose square is not above `integer`.
-            Isqrt = integer::isqrt, cl "ISQRT" ("integer") shares nothing slowly "%SLOW-ISQRT";
+            Isqrt = integer::isqrt, cl "ISQRT" ("integer") shares nothing gives integer slowly "%SLOW-ISQRT";
             /// Bitwise equivalence of the integers; -1 of none.
-            LogEqv = integer::logeqv, cl "LOGEQV" ("&rest integers") shares nothing slowly "%SLOW-LOGEQV";
+            LogEqv = integer::logeqv, cl "LOGEQV" ("&rest integers")
+                shares nothing gives integer slowly "%SLOW-LOGEQV";
             /// The integer with all bits inverted.
-            LogNot = integer::lognot, cl "LOGNOT" ("integer") shares nothing;
+            LogNot = integer::lognot, cl "LOGNOT" ("integer") shares nothing gives integer;
             /// Bits of `right` that are not in `left`.
-            LogAndC1 = integer::logandc1, cl "LOGANDC1" ("left right") shares nothing;
+            LogAndC1 = integer::logandc1, cl "LOGANDC1" ("left right") shares nothing gives integer;
             /// Bits of `left` that are not in `right`.
-            LogAndC2 = integer::logandc2, cl "LOGANDC2" ("left right") shares nothing;
+            LogAndC2 = integer::logandc2, cl "LOGANDC2" ("left right") shares nothing gives integer;
             /// Bits that are not in both.
-            LogNand = integer::lognand, cl "LOGNAND" ("left right") shares nothing;
+            LogNand = integer::lognand, cl "LOGNAND" ("left right") shares nothing gives integer;
             /// Bits that are in neither.
-            LogNor = integer::lognor, cl "LOGNOR" ("left right") shares nothing;
+            LogNor = integer::lognor, cl "LOGNOR" ("left right") shares nothing gives integer;
             /// Bits of `right` and those that are not in `left`.
-            LogOrC1 = integer::logorc1, cl "LOGORC1" ("left right") shares nothing;
+            LogOrC1 = integer::logorc1, cl "LOGORC1" ("left right") shares nothing gives integer;
             /// Bits of `left` and those that are not in `right`.
-            LogOrC2 = integer::logorc2, cl "LOGORC2" ("left right") shares nothing;
+            LogOrC2 = integer::logorc2, cl "LOGORC2" ("left right") shares nothing gives integer;
             /// Whether the numbers have a bit in common.
-            LogTest = integer::logtest, cl "LOGTEST" ("left right") shares nothing;
+            LogTest = integer::logtest, cl "LOGTEST" ("left right") shares nothing gives boolean;
             /// Whether bit `index` is set.
-            LogBitp = integer::logbitp, cl "LOGBITP" ("index integer") shares nothing;
+            LogBitp = integer::logbitp, cl "LOGBITP" ("index integer") shares nothing gives boolean;
             /// Number of ones; of zeros in a negative integer.
-            LogCount = integer::logcount, cl "LOGCOUNT" ("integer") shares nothing;
+            LogCount = integer::logcount, cl "LOGCOUNT" ("integer") shares nothing gives integer;
             /// Bits that the integer takes in two's complement, the sign not counted.
-            IntegerLength = integer::integer_length, cl "INTEGER-LENGTH" ("integer") shares nothing;
+            IntegerLength = integer::integer_length, cl "INTEGER-LENGTH" ("integer")
+                shares nothing gives integer;
             /// The field of `size` bits from `position` up.
             LoadByte = integer::load_byte, internal "%LDB" ("size position integer") shares nothing;
             /// `integer` with the field of `size` bits from `position` up taken from `new`.
@@ -562,86 +669,101 @@ macro_rules! for_each_builtin {
 
             // ---- characters
             /// The code of a character.
-            CharCode = character::char_code, cl "CHAR-CODE" ("character") shares nothing;
+            CharCode = character::char_code, cl "CHAR-CODE" ("character") shares nothing gives integer;
             /// The code of a character.
-            CharInt = character::char_code, cl "CHAR-INT" ("character") shares nothing;
+            CharInt = character::char_code, cl "CHAR-INT" ("character") shares nothing gives integer;
             /// The character with this code; `NIL` for a surrogate, which is none.
-            CodeChar = character::code_char, cl "CODE-CHAR" ("code") shares nothing;
+            CodeChar = character::code_char, cl "CODE-CHAR" ("code") shares nothing gives character or nil;
             /// The character that a character, or a string or symbol of one, stands for.
-            ToCharacter = character::to_character, cl "CHARACTER" ("designator") shares nothing;
+            ToCharacter = character::to_character, cl "CHARACTER" ("designator")
+                shares nothing gives character;
             /// The upper case of a letter; other characters as they are.
-            CharUpcase = character::char_upcase, cl "CHAR-UPCASE" ("character") shares nothing;
+            CharUpcase = character::char_upcase, cl "CHAR-UPCASE" ("character")
+                shares nothing gives character;
             /// The lower case of a letter; other characters as they are.
-            CharDowncase = character::char_downcase, cl "CHAR-DOWNCASE" ("character") shares nothing;
+            CharDowncase = character::char_downcase, cl "CHAR-DOWNCASE" ("character")
+                shares nothing gives character;
             /// Whether `character` is a letter in upper case.
-            UpperCasep = character::upper_case_p, cl "UPPER-CASE-P" ("character") shares nothing;
+            UpperCasep = character::upper_case_p, cl "UPPER-CASE-P" ("character")
+                shares nothing gives boolean;
             /// Whether `character` is a letter in lower case.
-            LowerCasep = character::lower_case_p, cl "LOWER-CASE-P" ("character") shares nothing;
+            LowerCasep = character::lower_case_p, cl "LOWER-CASE-P" ("character")
+                shares nothing gives boolean;
             /// Whether `character` is a letter with upper and lower case.
-            BothCasep = character::both_case_p, cl "BOTH-CASE-P" ("character") shares nothing;
+            BothCasep = character::both_case_p, cl "BOTH-CASE-P" ("character") shares nothing gives boolean;
             /// Whether `character` is a letter.
-            AlphaCharp = character::alpha_char_p, cl "ALPHA-CHAR-P" ("character") shares nothing;
+            AlphaCharp = character::alpha_char_p, cl "ALPHA-CHAR-P" ("character")
+                shares nothing gives boolean;
             /// Whether `character` is a letter or a digit.
-            Alphanumericp = character::alphanumericp, cl "ALPHANUMERICP" ("character") shares nothing;
+            Alphanumericp = character::alphanumericp, cl "ALPHANUMERICP" ("character")
+                shares nothing gives boolean;
             /// Whether `character` prints as itself.
-            GraphicCharp = character::graphic_char_p, cl "GRAPHIC-CHAR-P" ("character") shares nothing;
+            GraphicCharp = character::graphic_char_p, cl "GRAPHIC-CHAR-P" ("character")
+                shares nothing gives boolean;
             /// Whether `character` is one that every Common Lisp has.
-            StandardCharp = character::standard_char_p, cl "STANDARD-CHAR-P" ("character") shares nothing;
+            StandardCharp = character::standard_char_p, cl "STANDARD-CHAR-P" ("character")
+                shares nothing gives boolean;
             /// The weight of a digit, `NIL` for any other character.
             DigitCharp = character::digit_char_p, cl "DIGIT-CHAR-P" ("character &optional radix")
-                shares nothing;
+                shares nothing gives integer or nil;
             /// The digit of this weight, `NIL` if there is none.
-            DigitChar = character::digit_char, cl "DIGIT-CHAR" ("weight &optional radix") shares nothing;
+            DigitChar = character::digit_char, cl "DIGIT-CHAR" ("weight &optional radix")
+                shares nothing gives character or nil;
             /// The name of a character, `NIL` if it has none.
-            CharName = character::char_name, cl "CHAR-NAME" ("character") shares nothing;
+            CharName = character::char_name, cl "CHAR-NAME" ("character") shares nothing gives string or nil;
             /// The character of this name, `NIL` if there is none.
-            NameChar = character::name_char, cl "NAME-CHAR" ("name") shares nothing;
+            NameChar = character::name_char, cl "NAME-CHAR" ("name") shares nothing gives character or nil;
             /// Whether all characters are the same.
             CharEqualExactly = character::char_equal_exactly, cl "CHAR=" ("character &rest characters")
-                shares nothing -> one
-               ;
+                shares nothing -> one gives boolean;
             /// Whether no two characters are the same.
-            CharNotEqualExactly = character::char_not_equal_exactly, cl "CHAR/="
-                ("character &rest characters") shares nothing;
+            CharNotEqualExactly = character::char_not_equal_exactly,
+                cl "CHAR/=" ("character &rest characters")
+                shares nothing gives boolean;
             /// Whether the codes increase.
-            CharLess = character::char_less, cl "CHAR<" ("character &rest characters") shares nothing;
+            CharLess = character::char_less, cl "CHAR<" ("character &rest characters")
+                shares nothing gives boolean;
             /// Whether the codes decrease.
-            CharGreater = character::char_greater, cl "CHAR>" ("character &rest characters") shares nothing;
+            CharGreater = character::char_greater, cl "CHAR>" ("character &rest characters")
+                shares nothing gives boolean;
             /// Whether the codes never decrease.
             CharLessEqual = character::char_less_equal, cl "CHAR<=" ("character &rest characters")
-                shares nothing;
+                shares nothing gives boolean;
             /// Whether the codes never increase.
             CharGreaterEqual = character::char_greater_equal, cl "CHAR>=" ("character &rest characters")
-                shares nothing;
+                shares nothing gives boolean;
             /// As `char=`, ignoring case.
-            CharEqual = character::char_equal, cl "CHAR-EQUAL" ("character &rest characters") shares nothing;
+            CharEqual = character::char_equal, cl "CHAR-EQUAL" ("character &rest characters")
+                shares nothing gives boolean;
             /// As `char/=`, ignoring case.
             CharNotEqual = character::char_not_equal, cl "CHAR-NOT-EQUAL" ("character &rest characters")
-                shares nothing;
+                shares nothing gives boolean;
             /// As `char<`, ignoring case.
-            CharLessp = character::char_lessp, cl "CHAR-LESSP" ("character &rest characters") shares nothing;
+            CharLessp = character::char_lessp, cl "CHAR-LESSP" ("character &rest characters")
+                shares nothing gives boolean;
             /// As `char>`, ignoring case.
             CharGreaterp = character::char_greaterp, cl "CHAR-GREATERP" ("character &rest characters")
-                shares nothing;
+                shares nothing gives boolean;
             /// As `char<=`, ignoring case.
-            CharNotGreaterp = character::char_not_greaterp, cl "CHAR-NOT-GREATERP"
-                ("character &rest characters") shares nothing;
+            CharNotGreaterp = character::char_not_greaterp,
+                cl "CHAR-NOT-GREATERP" ("character &rest characters")
+                shares nothing gives boolean;
             /// As `char>=`, ignoring case.
             CharNotLessp = character::char_not_lessp, cl "CHAR-NOT-LESSP" ("character &rest characters")
-                shares nothing;
+                shares nothing gives boolean;
 
             // ---- strings
             /// The string that a string, symbol or character stands for.
-            String = string::string, cl "STRING" ("designator") shares nothing;
+            String = string::string, cl "STRING" ("designator") shares nothing gives string;
             /// Character `index` of a string.
-            Char = string::char, cl "CHAR" ("string index") shares nothing -> one;
+            Char = string::char, cl "CHAR" ("string index") shares nothing -> one gives character;
             /// Character `index` of a string.
-            Schar = string::char, cl "SCHAR" ("string index") shares nothing -> one;
+            Schar = string::char, cl "SCHAR" ("string index") shares nothing -> one gives character;
             /// Makes `character` character `index` of a string, and returns it.
             SetChar = string::set_char, internal "%SET-CHAR" ("string index character") shares elements;
             /// A fresh string of `size` times `character`.
-            MakeString = string::make_string, internal "%MAKE-STRING" ("size character") shares nothing
-                slowly "%SLOW-MAKE-STRING";
+            MakeString = string::make_string, internal "%MAKE-STRING" ("size character")
+                shares nothing gives string slowly "%SLOW-MAKE-STRING";
             /// Whether two parts of strings are the same.
             StringEqualExactly = string::string_equal_exactly, internal "%STRING="
                 ("left right &optional start1 end1 start2 end2") shares nothing slowly "%SLOW-STRING=";
@@ -675,16 +797,16 @@ macro_rules! for_each_builtin {
                 ("string start end") shares elements slowly "%SLOW-NSTRING-CAPITALIZE";
             /// The string without the characters of `bag` at both ends.
             StringTrim = string::trim, cl "STRING-TRIM" ("bag string")
-                shares nothing slowly "%SLOW-STRING-TRIM";
+                shares nothing gives string slowly "%SLOW-STRING-TRIM";
             /// The string without the characters of `bag` at its beginning.
-            StringLeftTrim = string::left_trim, cl "STRING-LEFT-TRIM" ("bag string") shares nothing
-                slowly "%SLOW-STRING-LEFT-TRIM";
+            StringLeftTrim = string::left_trim, cl "STRING-LEFT-TRIM" ("bag string")
+                shares nothing gives string slowly "%SLOW-STRING-LEFT-TRIM";
             /// The string without the characters of `bag` at its end.
-            StringRightTrim = string::right_trim, cl "STRING-RIGHT-TRIM" ("bag string") shares nothing
-                slowly "%SLOW-STRING-RIGHT-TRIM";
+            StringRightTrim = string::right_trim, cl "STRING-RIGHT-TRIM" ("bag string")
+                shares nothing gives string slowly "%SLOW-STRING-RIGHT-TRIM";
             /// The strings joined.
-            StringConcat = string::concat, internal "%STRING-CONCAT" ("&rest strings") shares nothing
-                slowly "%SLOW-STRING-CONCAT";
+            StringConcat = string::concat, internal "%STRING-CONCAT" ("&rest strings")
+                shares nothing gives string slowly "%SLOW-STRING-CONCAT";
             /// Where the pattern first is in a part of a string, or last with `from-end`; `NIL` if nowhere.
             SearchString = string::search, internal "%SEARCH-STRING" ("pattern string start end from-end")
                 shares nothing
@@ -703,7 +825,7 @@ macro_rules! for_each_builtin {
 
             // ---- lists
             /// A fresh pair.
-            Cons = list::cons, cl "CONS" ("car cdr") shares nothing -> one;
+            Cons = list::cons, cl "CONS" ("car cdr") shares nothing -> one gives pair;
             /// The car of a pair, `NIL` of `NIL`.
             Car = list::car, cl "CAR" ("list") shares nothing -> one;
             /// The cdr of a pair, `NIL` of `NIL`.
@@ -719,15 +841,15 @@ macro_rules! for_each_builtin {
             /// The second item of a list, `NIL` if there is none.
             Second = list::cadr, cl "SECOND" ("list") shares nothing -> one;
             /// Makes `object` the car of `pair`, and returns `pair`.
-            Rplaca = list::rplaca, cl "RPLACA" ("pair object") shares pairs -> one;
+            Rplaca = list::rplaca, cl "RPLACA" ("pair object") shares pairs -> one gives pair;
             /// Makes `object` the cdr of `pair`, and returns `pair`.
-            Rplacd = list::rplacd, cl "RPLACD" ("pair object") shares pairs -> one;
+            Rplacd = list::rplacd, cl "RPLACD" ("pair object") shares pairs -> one gives pair;
             /// Makes `value` the car of `pair`, and returns `value`.
             SetCar = list::set_car, internal "%SET-CAR" ("pair value") shares pairs -> one;
             /// Makes `value` the cdr of `pair`, and returns `value`.
             SetCdr = list::set_cdr, internal "%SET-CDR" ("pair value") shares pairs -> one;
             /// A fresh list of `objects`.
-            List = list::list, cl "LIST" ("&rest objects") shares nothing -> one;
+            List = list::list, cl "LIST" ("&rest objects") shares nothing -> one gives list;
             /// A list of the objects that ends in the last of them.
             ListStar = list::list_star, cl "LIST*" ("object &rest objects") shares nothing -> one;
             /// The lists joined: all but the last are copied.
@@ -801,27 +923,27 @@ macro_rules! for_each_builtin {
             /// The tenth item of a list, `NIL` if there is none.
             Tenth = list::tenth, cl "TENTH" ("list") shares nothing;
             /// Whether a list is empty; for anything but a list it fails.
-            Endp = list::endp, cl "ENDP" ("list") shares nothing;
+            Endp = list::endp, cl "ENDP" ("list") shares nothing gives boolean tests nil;
             /// Item `index` of a list, `NIL` if there is none.
             Nth = list::nth, cl "NTH" ("index list") shares nothing slowly "%SLOW-NTH";
-            /// The list without its first `count` items.
-            Nthcdr = list::nthcdr, cl "NTHCDR" ("count list") shares nothing slowly "%SLOW-NTHCDR";
+            /// The list `tail` without its first `count` items; of 0 items `tail` itself, of any type.
+            Nthcdr = list::nthcdr, cl "NTHCDR" ("count tail") shares nothing slowly "%SLOW-NTHCDR";
             /// The last `count` pairs of a list, one unless said otherwise.
             Last = list::last, cl "LAST" ("list &optional count") shares nothing slowly "%SLOW-LAST";
             /// A copy of the list without its last `count` pairs, one unless said otherwise.
             Butlast = list::butlast, cl "BUTLAST" ("list &optional count")
-                shares nothing slowly "%SLOW-BUTLAST";
+                shares nothing gives list slowly "%SLOW-BUTLAST";
             /// The list, its last `count` pairs cut off.
             NButlast = list::nbutlast, cl "NBUTLAST" ("list &optional count")
-                shares pairs slowly "%SLOW-NBUTLAST";
+                shares pairs gives list slowly "%SLOW-NBUTLAST";
             /// Number of items of a list, `NIL` if it is circular.
             ListLength = list::list_length, cl "LIST-LENGTH" ("list")
-                shares nothing slowly "%SLOW-LIST-LENGTH";
+                shares nothing gives integer or nil slowly "%SLOW-LIST-LENGTH";
             /// A fresh list of `size` times `item`.
             MakeList = list::make_list, internal "%MAKE-LIST" ("size item")
                 shares nothing slowly "%SLOW-MAKE-LIST";
             /// `alist` with a pair of `key` and `value` in front.
-            Acons = list::acons, cl "ACONS" ("key value alist") shares nothing;
+            Acons = list::acons, cl "ACONS" ("key value alist") shares nothing gives pair;
             /// The lists joined: the end of each is changed to the next.
             NConc = list::nconc, cl "NCONC" ("&rest lists") shares pairs slowly "%SLOW-NCONC";
             /// The items of `list` in reverse order, in front of `tail`.
@@ -829,15 +951,17 @@ macro_rules! for_each_builtin {
             /// As `revappend`, from the pairs of `list`.
             NReconc = list::nreconc, cl "NRECONC" ("list tail") shares pairs slowly "%SLOW-NRECONC";
             /// A fresh list of the same items.
-            CopyList = list::copy_list, cl "COPY-LIST" ("list") shares nothing slowly "%SLOW-COPY-LIST";
+            CopyList = list::copy_list, cl "COPY-LIST" ("list")
+                shares nothing gives list slowly "%SLOW-COPY-LIST";
             /// A fresh list with fresh pairs for those that are its items.
-            CopyAlist = list::copy_alist, cl "COPY-ALIST" ("alist") shares nothing slowly "%SLOW-COPY-ALIST";
+            CopyAlist = list::copy_alist, cl "COPY-ALIST" ("alist")
+                shares nothing gives list slowly "%SLOW-COPY-ALIST";
             /// A fresh tree of pairs with the same leaves.
             CopyTree = list::copy_tree, cl "COPY-TREE" ("tree") shares nothing slowly "%SLOW-COPY-TREE";
             /// A fresh list of the items in front of the tail that is `object`.
-            Ldiff = list::ldiff, cl "LDIFF" ("list object") shares nothing slowly "%SLOW-LDIFF";
+            Ldiff = list::ldiff, cl "LDIFF" ("list object") shares nothing gives list slowly "%SLOW-LDIFF";
             /// Whether `object` is a tail of `list`.
-            Tailp = list::tailp, cl "TAILP" ("object list") shares nothing slowly "%SLOW-TAILP";
+            Tailp = list::tailp, cl "TAILP" ("object list") shares nothing gives boolean slowly "%SLOW-TAILP";
             /// `alist` with a pair for each key and datum in front.
             Pairlis = list::pairlis, cl "PAIRLIS" ("keys data &optional alist")
                 shares nothing slowly "%SLOW-PAIRLIS";
@@ -886,7 +1010,8 @@ macro_rules! for_each_builtin {
 
             // ---- sequences
             /// Number of elements.
-            Length = sequence::length, cl "LENGTH" ("sequence") shares nothing slowly "%SLOW-LENGTH";
+            Length = sequence::length, cl "LENGTH" ("sequence")
+                shares nothing gives integer slowly "%SLOW-LENGTH";
             /// Element `index` of a list or vector. Fails with `:type-error` if there is none.
             Elt = sequence::elt, cl "ELT" ("sequence index") shares nothing slowly "%SLOW-ELT";
             /// Makes `value` element `index` of a list or vector, and returns `value`.
@@ -894,13 +1019,16 @@ macro_rules! for_each_builtin {
                 shares elements slowly "%SLOW-SET-ELT";
             /// A fresh sequence of the elements from `start` to before `end`.
             Subseq = sequence::subseq, cl "SUBSEQ" ("sequence start &optional end")
-                shares nothing slowly "%SLOW-SUBSEQ";
+                shares nothing gives sequence slowly "%SLOW-SUBSEQ";
             /// A fresh sequence of the same elements.
-            CopySeq = sequence::copy_seq, cl "COPY-SEQ" ("sequence") shares nothing slowly "%SLOW-COPY-SEQ";
+            CopySeq = sequence::copy_seq, cl "COPY-SEQ" ("sequence")
+                shares nothing gives sequence slowly "%SLOW-COPY-SEQ";
             /// A fresh sequence of the elements in reverse order.
-            Reverse = sequence::reverse, cl "REVERSE" ("sequence") shares nothing slowly "%SLOW-REVERSE";
+            Reverse = sequence::reverse, cl "REVERSE" ("sequence")
+                shares nothing gives sequence slowly "%SLOW-REVERSE";
             /// The sequence, reversed in place.
-            NReverse = sequence::nreverse, cl "NREVERSE" ("sequence") shares pairs slowly "%SLOW-NREVERSE";
+            NReverse = sequence::nreverse, cl "NREVERSE" ("sequence")
+                shares pairs gives sequence slowly "%SLOW-NREVERSE";
             /// Makes `item` every element of a part of a vector, and returns the vector.
             Fill = sequence::fill, internal "%FILL" ("vector item start end")
                 shares elements slowly "%SLOW-FILL";
@@ -910,10 +1038,10 @@ macro_rules! for_each_builtin {
                 slowly "%SLOW-REPLACE";
             /// A fresh simple vector of the items of a list.
             ListVector = sequence::list_vector, internal "%LIST-VECTOR" ("list")
-                shares nothing slowly "%SLOW-LIST-VECTOR";
+                shares nothing gives vector slowly "%SLOW-LIST-VECTOR";
             /// A fresh string of the characters in a list.
             ListString = sequence::list_string, internal "%LIST-STRING" ("list")
-                shares nothing slowly "%SLOW-LIST-STRING";
+                shares nothing gives string slowly "%SLOW-LIST-STRING";
             /// A fresh list of the elements of a part of a vector.
             VectorList = sequence::vector_list, internal "%VECTOR-LIST" ("vector start end") shares nothing
                 slowly "%SLOW-VECTOR-LIST";
@@ -935,7 +1063,7 @@ macro_rules! for_each_builtin {
 
             // ---- arrays
             /// A fresh simple vector of `objects`.
-            Vector = array::vector, cl "VECTOR" ("&rest objects") shares nothing -> one;
+            Vector = array::vector, cl "VECTOR" ("&rest objects") shares nothing -> one gives vector;
             /// Element `index` of a simple general vector.
             Svref = array::svref, cl "SVREF" ("vector index") shares nothing -> one;
             /// Makes `value` element `index` of a simple general vector, and returns `value`.
@@ -951,24 +1079,29 @@ macro_rules! for_each_builtin {
             SetRowMajorAref = array::set_row_major_aref, internal "%SET-ROW-MAJOR-AREF" ("array index value")
                 shares elements;
             /// The index, counted row by row, of the element that the subscripts select.
-            ArrayRowMajorIndex = array::array_row_major_index, cl "ARRAY-ROW-MAJOR-INDEX"
-                ("array &rest subscripts") shares nothing;
+            ArrayRowMajorIndex = array::array_row_major_index,
+                cl "ARRAY-ROW-MAJOR-INDEX" ("array &rest subscripts")
+                shares nothing gives integer;
             /// Whether the subscripts select an element.
             ArrayInBoundsp = array::array_in_bounds_p, cl "ARRAY-IN-BOUNDS-P" ("array &rest subscripts")
-                shares nothing;
+                shares nothing gives boolean;
             /// Number of elements, those behind a fill pointer too.
-            ArrayTotalSize = array::array_total_size, cl "ARRAY-TOTAL-SIZE" ("array") shares nothing;
+            ArrayTotalSize = array::array_total_size, cl "ARRAY-TOTAL-SIZE" ("array")
+                shares nothing gives integer;
             /// Number of dimensions.
-            ArrayRank = array::array_rank, cl "ARRAY-RANK" ("array") shares nothing;
+            ArrayRank = array::array_rank, cl "ARRAY-RANK" ("array") shares nothing gives integer;
             /// List of the dimensions.
-            ArrayDimensions = array::array_dimensions, cl "ARRAY-DIMENSIONS" ("array") shares nothing;
+            ArrayDimensions = array::array_dimensions, cl "ARRAY-DIMENSIONS" ("array")
+                shares nothing gives list;
             /// Dimension number `axis`.
-            ArrayDimension = array::array_dimension, cl "ARRAY-DIMENSION" ("array axis") shares nothing;
+            ArrayDimension = array::array_dimension, cl "ARRAY-DIMENSION" ("array axis")
+                shares nothing gives integer;
             /// Whether the array has a fill pointer.
             ArrayHasFillPointerp = array::array_has_fill_pointer_p, cl "ARRAY-HAS-FILL-POINTER-P" ("array")
-                shares nothing;
+                shares nothing gives boolean;
             /// Whether the array was made to be adjustable.
-            AdjustableArrayp = array::adjustable_array_p, cl "ADJUSTABLE-ARRAY-P" ("array") shares nothing;
+            AdjustableArrayp = array::adjustable_array_p, cl "ADJUSTABLE-ARRAY-P" ("array")
+                shares nothing gives boolean;
             /// The array to which `array` is displaced, and the index of its first element there; `NIL` and 0
             /// if there is none.
             Displacement = array::displacement, cl "ARRAY-DISPLACEMENT" ("array") shares nothing;
@@ -984,21 +1117,24 @@ macro_rules! for_each_builtin {
             /// The storage of the elements: a simple vector or string, the array itself if it is one.
             ArrayData = array::array_data, internal "%ARRAY-DATA" ("array") shares nothing;
             /// The fill pointer of a vector.
-            FillPointer = array::fill_pointer, cl "FILL-POINTER" ("vector") shares nothing;
+            FillPointer = array::fill_pointer, cl "FILL-POINTER" ("vector") shares nothing gives integer;
             /// Makes `index` the fill pointer of a vector, and returns it.
             SetFillPointer = array::set_fill_pointer, internal "%SET-FILL-POINTER" ("vector index")
                 shares elements;
             /// Puts `object` where the fill pointer is and moves that on; the index, or `NIL` if the vector
             /// is full.
-            VectorPush = array::vector_push, cl "VECTOR-PUSH" ("object vector") shares elements;
+            VectorPush = array::vector_push, cl "VECTOR-PUSH" ("object vector")
+                shares elements gives integer or nil;
             /// As `vector-push`; a full vector grows.
             VectorPushExtend = array::vector_push_extend, cl "VECTOR-PUSH-EXTEND"
-                ("object vector &optional extension") shares elements slowly "%SLOW-VECTOR-PUSH-EXTEND";
+                ("object vector &optional extension")
+                shares elements gives integer
+                slowly "%SLOW-VECTOR-PUSH-EXTEND";
             /// The element in front of the fill pointer, which moves back to it.
             VectorPop = array::vector_pop, cl "VECTOR-POP" ("vector") shares elements;
             /// A fresh simple vector of `size` times `object`.
-            MakeVector = array::make_vector, internal "%MAKE-VECTOR" ("size object") shares nothing
-                slowly "%SLOW-MAKE-VECTOR";
+            MakeVector = array::make_vector, internal "%MAKE-VECTOR" ("size object")
+                shares nothing gives vector slowly "%SLOW-MAKE-VECTOR";
             /// Memory for a simple vector or string of `size` elements, which is one when all have been
             /// filled.
             BeginVector = array::begin_vector, internal "%BEGIN-VECTOR" ("size string-p") shares nothing;
@@ -1016,8 +1152,9 @@ macro_rules! for_each_builtin {
             // ---- hash tables
             /// A hash table: `test` is 0 for `eq`, 1 for `eql`, 2 for `equal`, 3 for `equalp`, 4 for the
             /// functions of a program.
-            MakeHashTable = table::make_hash_table, internal "%MAKE-HASH-TABLE"
-                ("test size test-function hash-function") shares nothing;
+            MakeHashTable = table::make_hash_table,
+                internal "%MAKE-HASH-TABLE" ("test size test-function hash-function")
+                shares nothing gives table;
             /// The value of `key`, or `default`, and whether the table has it.
             Gethash = table::gethash, cl "GETHASH" ("key table &optional default")
                 shares nothing slowly "%SLOW-GETHASH";
@@ -1026,16 +1163,18 @@ macro_rules! for_each_builtin {
                 shares tables slowly "%SLOW-PUTHASH";
             /// Adds `delta` to the value of `key`, or to `default` if it has none, and returns the sum.
             AddToValue = table::add_to_value, internal "%ADD-TO-VALUE" ("key table default delta")
-                shares tables
-                slowly "%SLOW-ADD-TO-VALUE";
+                shares tables gives number slowly "%SLOW-ADD-TO-VALUE";
             /// Removes `key` from the table. Returns whether it was there.
-            Remhash = table::remhash, cl "REMHASH" ("key table") shares tables slowly "%SLOW-REMHASH";
+            Remhash = table::remhash, cl "REMHASH" ("key table")
+                shares tables gives boolean slowly "%SLOW-REMHASH";
             /// Removes all entries of the table, and returns it.
-            Clrhash = table::clrhash, cl "CLRHASH" ("table") shares tables;
+            Clrhash = table::clrhash, cl "CLRHASH" ("table") shares tables gives table;
             /// Number of keys.
-            HashTableCount = table::hash_table_count, cl "HASH-TABLE-COUNT" ("table") shares nothing;
+            HashTableCount = table::hash_table_count, cl "HASH-TABLE-COUNT" ("table")
+                shares nothing gives integer;
             /// Number of keys for which the table has room at present.
-            HashTableSize = table::hash_table_size, cl "HASH-TABLE-SIZE" ("table") shares nothing;
+            HashTableSize = table::hash_table_size, cl "HASH-TABLE-SIZE" ("table")
+                shares nothing gives integer;
             /// The number of the test, as for `%make-hash-table`, and the functions of a program.
             HashTableTest = table::hash_table_test, internal "%HASH-TABLE-TEST" ("table") shares nothing;
             /// The position behind the next entry from `position` on, its key and its value; `NIL` at the
@@ -1071,7 +1210,8 @@ macro_rules! for_each_builtin {
             /// Makes `value` slot `index` of `instance`, and returns `value`.
             SetSlotOf = structure::set_slot, internal "%SET-SLOT" ("class index instance value") shares slots;
             /// Whether `object` is an instance of the structure class named `class` or a subclass.
-            IsInstance = structure::is_instance, internal "%INSTANCE-P" ("class object") shares nothing;
+            IsInstance = structure::is_instance, internal "%INSTANCE-P" ("class object")
+                shares nothing gives boolean;
 
             // ---- failures and the control stack
             /// The innermost handlers below `height`, or of all if that is `NIL`, that no mask hides: index
@@ -1180,11 +1320,11 @@ macro_rules! for_each_builtin {
 
             // ---- symbols
             /// The name of a symbol, a string that is not to be changed.
-            SymbolName = symbol::symbol_name, cl "SYMBOL-NAME" ("symbol") shares nothing;
+            SymbolName = symbol::symbol_name, cl "SYMBOL-NAME" ("symbol") shares nothing gives string;
             /// The home package of a symbol, or `NIL`.
             SymbolPackage = symbol::symbol_package, cl "SYMBOL-PACKAGE" ("symbol") shares nothing;
             /// The property list of a symbol.
-            SymbolPlist = symbol::symbol_plist, cl "SYMBOL-PLIST" ("symbol") shares nothing;
+            SymbolPlist = symbol::symbol_plist, cl "SYMBOL-PLIST" ("symbol") shares nothing gives list;
             /// Makes `plist` the property list of `symbol`, and returns it.
             SetSymbolPlist = symbol::set_symbol_plist, internal "%SET-SYMBOL-PLIST" ("symbol plist")
                 shares properties;
@@ -1196,15 +1336,15 @@ macro_rules! for_each_builtin {
                 shares properties slowly "%SLOW-PUT";
             /// Removes the property `indicator` of `symbol`; whether it had one.
             Remprop = symbol::remprop, cl "REMPROP" ("symbol indicator")
-                shares properties slowly "%SLOW-REMPROP";
+                shares properties gives boolean slowly "%SLOW-REMPROP";
             /// The value of the special variable `symbol`. Fails with `:unbound-variable` if it has none.
             SymbolValue = symbol::symbol_value, cl "SYMBOL-VALUE" ("symbol") shares nothing;
             /// Sets the special variable `symbol`, and returns `value`.
             Set = symbol::set, cl "SET" ("symbol value") shares variables;
             /// Whether the special variable `symbol` has a value.
-            Boundp = symbol::boundp, cl "BOUNDP" ("symbol") shares nothing;
+            Boundp = symbol::boundp, cl "BOUNDP" ("symbol") shares nothing gives boolean;
             /// Removes the value of the special variable `symbol`, and returns `symbol`.
-            Makunbound = symbol::makunbound, cl "MAKUNBOUND" ("symbol") shares variables;
+            Makunbound = symbol::makunbound, cl "MAKUNBOUND" ("symbol") shares variables gives symbol;
             /// Whether `name`, a symbol or `(setf symbol)`, names a global function or macro.
             Fboundp = symbol::fboundp, cl "FBOUNDP" ("name") shares nothing;
             /// The global function, or macro function, named by `symbol`. Fails with `:undefined-function` if
@@ -1228,10 +1368,10 @@ macro_rules! for_each_builtin {
             /// Whether `symbol` belongs to the language and may not be redefined.
             LockedP = symbol::locked_p, internal "%LOCKED-P" ("symbol") shares nothing;
             /// A fresh symbol without a package.
-            MakeSymbol = symbol::make_symbol, cl "MAKE-SYMBOL" ("name") shares nothing;
+            MakeSymbol = symbol::make_symbol, cl "MAKE-SYMBOL" ("name") shares nothing gives symbol;
             /// A fresh symbol without a package, named by `prefix` and a number: `*gensym-counter*`, or
             /// `prefix` itself.
-            Gensym = symbol::gensym, cl "GENSYM" ("&optional prefix") shares variables;
+            Gensym = symbol::gensym, cl "GENSYM" ("&optional prefix") shares variables gives symbol;
             /// The name of a function, as its definition gives it, or `NIL`.
             FunctionName = symbol::function_name, internal "%FUNCTION-NAME" ("function") shares nothing;
             /// The lambda list of a function as it was written.
@@ -1250,15 +1390,18 @@ macro_rules! for_each_builtin {
             /// The package of this name or nickname, or `NIL`.
             FindPackage = package::find_package, cl "FIND-PACKAGE" ("name") shares nothing;
             /// Whether `object` is a package.
-            Packagep = package::packagep, cl "PACKAGEP" ("object") shares nothing;
+            Packagep = package::packagep, cl "PACKAGEP" ("object") shares nothing gives boolean;
             /// The name of a package.
-            PackageName = package::package_name, cl "PACKAGE-NAME" ("package") shares nothing;
+            PackageName = package::package_name, cl "PACKAGE-NAME" ("package") shares nothing gives string;
             /// The other names of a package.
-            PackageNicknames = package::package_nicknames, cl "PACKAGE-NICKNAMES" ("package") shares nothing;
+            PackageNicknames = package::package_nicknames, cl "PACKAGE-NICKNAMES" ("package")
+                shares nothing gives list;
             /// The packages whose external symbols `package` inherits.
-            PackageUseList = package::package_use_list, cl "PACKAGE-USE-LIST" ("package") shares nothing;
+            PackageUseList = package::package_use_list, cl "PACKAGE-USE-LIST" ("package")
+                shares nothing gives list;
             /// All packages.
-            ListAllPackages = package::list_all_packages, cl "LIST-ALL-PACKAGES" ("") shares nothing;
+            ListAllPackages = package::list_all_packages, cl "LIST-ALL-PACKAGES" ("")
+                shares nothing gives list;
             /// The package of this name, made if there is none, with these nicknames, and using these
             /// packages.
             MakePackage = package::make_package, internal "%MAKE-PACKAGE" ("name nicknames uses")
@@ -1281,10 +1424,11 @@ macro_rules! for_each_builtin {
             Shadow = package::shadow, cl "SHADOW" ("names &optional package") shares definitions;
             /// The symbol that `name` denotes in `package`, made if there is none; and how the package has
             /// it, `NIL` for new.
-            Intern = package::intern, cl "INTERN" ("name &optional package") shares definitions;
+            Intern = package::intern, cl "INTERN" ("name &optional package") shares definitions gives symbol;
             /// The symbol that `name` denotes in `package`, and how the package has it; `NIL` twice if there
             /// is none.
-            FindSymbol = package::find_symbol, cl "FIND-SYMBOL" ("name &optional package") shares nothing;
+            FindSymbol = package::find_symbol, cl "FIND-SYMBOL" ("name &optional package")
+                shares nothing gives symbol;
             /// All external symbols of a package, by name.
             ExternalSymbols = package::external_symbols, internal "%EXTERNAL-SYMBOLS" ("package")
                 shares nothing;
@@ -1441,8 +1585,7 @@ macro_rules! for_each_builtin {
             MakeStringOutput = stream::make_string_output, internal "%MAKE-STRING-OUTPUT" ("") shares streams;
             /// The characters that a string stream has gathered since the last call.
             GetOutputStreamString = stream::get_output_stream_string, cl "GET-OUTPUT-STREAM-STRING" ("stream")
-                shares own
-                slowly "%SLOW-GET-OUTPUT-STREAM-STRING";
+                shares own gives string slowly "%SLOW-GET-OUTPUT-STREAM-STRING";
             /// How many characters a string stream has gathered since it was last asked for them.
             GatheredLength = stream::gathered_length, internal "%GATHERED-LENGTH" ("stream") shares nothing;
             /// The strings in which a string stream has gathered them, the last first; it begins afresh.
@@ -1508,7 +1651,7 @@ macro_rules! for_each_builtin {
             StringOfBytes = stream::string_of_bytes, internal "%STRING-OF-BYTES" ("vector &optional as-text")
                 shares nothing;
             /// Whether `object` is a stream.
-            Streamp = stream::streamp, cl "STREAMP" ("object") shares nothing;
+            Streamp = stream::streamp, cl "STREAMP" ("object") shares nothing gives boolean tests stream;
             /// Whether a stream can be read from.
             InputStreamP = stream::input_stream_p, cl "INPUT-STREAM-P" ("stream")
                 shares nothing slowly "%SLOW-INPUT-STREAM-P";
@@ -1531,7 +1674,8 @@ macro_rules! for_each_builtin {
                 ("&optional stream eof-error-p eof-value recursive-p")
                 shares own slowly "%SLOW-READ-CHAR-NO-HANG";
             /// Whether a character of a stream is there to be read.
-            Listen = stream::listen, cl "LISTEN" ("&optional stream") shares own slowly "%SLOW-LISTEN";
+            Listen = stream::listen, cl "LISTEN" ("&optional stream")
+                shares own gives boolean slowly "%SLOW-LISTEN";
             /// The next character of a stream, which stays there; with `T`, after white space; with a
             /// character, up to that.
             PeekChar = stream::peek_char, cl "PEEK-CHAR"
@@ -1546,22 +1690,23 @@ macro_rules! for_each_builtin {
                 ("&optional stream eof-error-p eof-value recursive-p") shares own slowly "%SLOW-READ-LINE";
             /// Writes a character to a stream, and returns it.
             WriteChar = stream::write_char, cl "WRITE-CHAR" ("character &optional stream")
-                shares own slowly "%SLOW-WRITE-CHAR";
+                shares own gives character slowly "%SLOW-WRITE-CHAR";
             /// Writes a part of a string to a stream, and returns the string.
             WriteStringPart = stream::write_string, internal "%WRITE-STRING" ("string stream start end")
                 shares own
                 slowly "%SLOW-WRITE-STRING";
             /// Ends the line that is being written to a stream.
-            Terpri = stream::terpri, cl "TERPRI" ("&optional stream") shares own slowly "%SLOW-TERPRI";
+            Terpri = stream::terpri, cl "TERPRI" ("&optional stream")
+                shares own gives nil slowly "%SLOW-TERPRI";
             /// Ends the line that is being written to a stream, unless it is empty; whether it did.
             FreshLine = stream::fresh_line, cl "FRESH-LINE" ("&optional stream")
-                shares own slowly "%SLOW-FRESH-LINE";
+                shares own gives boolean slowly "%SLOW-FRESH-LINE";
             /// Writes the buffered output of a stream.
             FinishOutput = stream::finish_output, cl "FINISH-OUTPUT" ("&optional stream")
-                shares own slowly "%SLOW-FINISH-OUTPUT";
+                shares own gives nil slowly "%SLOW-FINISH-OUTPUT";
             /// Writes the buffered output of a stream.
             ForceOutput = stream::finish_output, cl "FORCE-OUTPUT" ("&optional stream")
-                shares own slowly "%SLOW-FORCE-OUTPUT";
+                shares own gives nil slowly "%SLOW-FORCE-OUTPUT";
 
             // ---- the logical database
             /// Adds a fact to the database: `T` if it was new, or the fact that it replaces as the value of a
@@ -1606,16 +1751,18 @@ macro_rules! for_each_builtin {
             // ---- the host
             /// The arguments of the program, a list of strings.
             CommandLineArguments = outside::command_line_arguments, esl "COMMAND-LINE-ARGUMENTS" ("")
-                shares nothing;
+                shares nothing gives list;
             /// Seconds on the machine's clock, which never goes back.
-            Now = outside::now, esl "NOW" ("") shares clock;
+            Now = outside::now, esl "NOW" ("") shares clock gives number;
             /// Microseconds on the machine's clock, which never goes back.
-            InternalRealTime = outside::internal_real_time, cl "GET-INTERNAL-REAL-TIME" ("") shares clock;
+            InternalRealTime = outside::internal_real_time, cl "GET-INTERNAL-REAL-TIME" ("")
+                shares clock gives integer;
             /// Microseconds for which processors have worked for the process; under a virtual clock, in which
             /// tasks ran.
-            InternalRunTime = outside::internal_run_time, cl "GET-INTERNAL-RUN-TIME" ("") shares clock;
+            InternalRunTime = outside::internal_run_time, cl "GET-INTERNAL-RUN-TIME" ("")
+                shares clock gives integer;
             /// Seconds since the beginning of 1900, UTC.
-            UniversalTime = outside::universal_time, cl "GET-UNIVERSAL-TIME" ("") shares clock;
+            UniversalTime = outside::universal_time, cl "GET-UNIVERSAL-TIME" ("") shares clock gives integer;
 
             // ---- events
             /// A new event. The name is for reports.
@@ -1626,7 +1773,7 @@ macro_rules! for_each_builtin {
             /// The same as `signal`.
             SignalEvent = event::signal, esl "SIGNAL-EVENT" ("event &rest arguments") shares points;
             /// How often an event was signalled.
-            EventCount = event::event_count, esl "EVENT-COUNT" ("event") shares points;
+            EventCount = event::event_count, esl "EVENT-COUNT" ("event") shares points gives integer;
             /// The mark of an event, which its next signal takes away, or the list of those of a list of
             /// events. A wait that is given it does not begin if there was a signal since.
             MarkEvents = event::mark_events, internal "%MARK-EVENTS" ("events") shares points;
@@ -1731,7 +1878,7 @@ macro_rules! for_each_builtin {
             /// Whether `object` is a task.
             Taskp = task::taskp, internal "%TASKP" ("object") shares nothing;
             /// `:running`, `:waiting`, `:succeeded`, `:failed` or `:aborted`.
-            TaskStatus = task::task_status, esl "TASK-STATUS" ("task") shares points;
+            TaskStatus = task::task_status, esl "TASK-STATUS" ("task") shares points gives symbol;
             /// The number of a task, and that of the task that it belongs to: the one that made it, or, where
             /// that has ended, the one that that belonged to. `NIL` when it has ended.
             TaskNumber = task::task_number, internal "%TASK-NUMBER" ("task") shares nothing;

@@ -168,7 +168,9 @@ fn failures_of(checked: &CheckedText, compiled: &mut Compiled) -> Option<Inferre
     let cores = std::mem::take(&mut compiled.core);
     let (table, _) = esl_analysis::analyze(cores, &compiled.sources, &AnalysisOptions::default());
     esl_analysis::sharpen(&mut compiled.diagnostics, &table);
-    compiled.diagnostics.extend(table.findings.iter().cloned());
+    let mut found = table.findings.clone();
+    compiled.drop_allowed(&mut found);
+    compiled.diagnostics.extend(found);
     let name = path_of(&checked.uri).display().to_string();
     Some(InferredText::new(name, checked.text.clone(), table))
 }

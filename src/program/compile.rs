@@ -6,7 +6,7 @@ use esl_bytecode::span::Span;
 use esl_compiler::core::Core;
 use esl_compiler::cover::CountedPlace;
 use esl_compiler::diagnostic::{Sources, code};
-use esl_compiler::session::{Compiler, Texts};
+use esl_compiler::session::{AllowedWarnings, Compiler, Texts};
 use esl_host::{Host, Inbox, ProcessSignal, RealHost, Rights};
 use esl_vm::vm::{Config, Vm};
 
@@ -42,9 +42,19 @@ pub struct Compiled {
     pub passages: Vec<u64>,
     /// Top-level forms of the program in the core language, if it was compiled for an analysis.
     pub core: Vec<Core>,
+    /// Warnings that forms of the program allow.
+    pub allowed: Vec<AllowedWarnings>,
 }
 
 impl Compiled {
+    /// Drops warnings of an analysis that the program allows in their places.
+    pub fn drop_allowed(&self, findings: &mut Vec<Diagnostic>) {
+        findings.retain(|finding| {
+            let is_allowed = |allowed: &AllowedWarnings| allowed.include(finding.code, finding.primary.span);
+            finding.severity != Severity::Warning || !self.allowed.iter().any(is_allowed)
+        });
+    }
+
     /// Returns whether an error was found.
     pub fn has_errors(&self) -> bool {
         self.diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error)
@@ -208,8 +218,8 @@ fn compile_texts(
     };
     let program = module.map(|module| Program { module, file: None });
     let (sources, places) = (texts.sources().clone(), texts.places().to_vec());
-    let core = texts.take_core();
-    Compiled { program, diagnostics, sources, stopped, places, passages, core }
+    let (core, allowed) = (texts.take_core(), texts.allowed().to_vec());
+    Compiled { program, diagnostics, sources, stopped, places, passages, core, allowed }
 }
 
 /// Returns the machine in which macros run. It may read the modules of `path`, and nothing else.

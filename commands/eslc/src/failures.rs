@@ -60,7 +60,9 @@ pub(crate) fn list_failures(options: &FailureOptions) -> Result<u8, u8> {
     let wanted = AnalysisOptions { all: options.all, explained: options.explain.clone() };
     let AnalysedProgram { mut compiled, table, explanation } = analysed(&options.files, compiling, &wanted)?;
     // Warnings of the compiler are those of `eslc check`.
-    compiled.diagnostics = table.findings.clone();
+    let mut findings = table.findings.clone();
+    compiled.drop_allowed(&mut findings);
+    compiled.diagnostics = findings;
     compiling.warnings.apply(&mut compiled);
     let has_failed = compiled.has_errors();
     print_diagnostics(&compiled, &compiling.style);

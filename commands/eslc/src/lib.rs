@@ -383,7 +383,9 @@ fn check_program(
         if !compiled.has_errors() {
             let (table, _) = esl_analysis::analyze(cores, &compiled.sources, &AnalysisOptions::default());
             esl_analysis::sharpen(&mut compiled.diagnostics, &table);
-            compiled.diagnostics.extend(table.findings);
+            let mut found = table.findings;
+            compiled.drop_allowed(&mut found);
+            compiled.diagnostics.extend(found);
         }
         compiled
     })?;

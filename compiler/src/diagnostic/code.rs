@@ -60,6 +60,10 @@ impl Stage {
     }
 }
 
+/// Codes of the warnings of analyses, which the compiler only lets forms allow.
+pub const OF_ANALYSES: [&str; 5] =
+    ["clause-never-applies", "declared-never", "endless-retry", "resource-order", "wrong-type"];
+
 /// Returns the code called `name`.
 pub fn find(name: &str) -> Option<&'static DiagnosticCode> {
     ALL.iter().copied().find(|code| code.name == name)

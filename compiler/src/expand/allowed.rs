@@ -30,6 +30,11 @@ pub(super) fn with_allowed_warnings(
 }
 
 impl Expander {
+    /// Returns the warnings that forms allow.
+    pub fn allowed(&self) -> &[AllowedWarnings] {
+        &self.allowed
+    }
+
     /// Drops the warnings that forms allow. Of one that is about several places, those are dropped at which
     /// it is allowed, and of the others the first ones are kept.
     pub fn drop_allowed(&self, findings: &mut Vec<Diagnostic>) {
@@ -73,7 +78,9 @@ impl Expander {
                 );
             };
             let name = symbol.name().to_ascii_lowercase();
+            let of_analysis = code::OF_ANALYSES.into_iter().find(|code| *code == name);
             match code::find(&name) {
+                None if of_analysis.is_some() => codes.extend(of_analysis),
                 Some(code) if code.severity == Severity::Warning => codes.push(code.name),
                 Some(_) => {
                     return Err(form.malformed_at(span, &format!("cannot allow `{name}`, which is an error")));

@@ -1,10 +1,8 @@
 //! Constant arguments that a function refuses, and how messages show the parameters of a function.
 
-use std::sync::LazyLock;
-
-use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
+use esl_bytecode::builtin::Builtin;
 use esl_bytecode::datum::Datum;
-use esl_bytecode::kind::{ArgumentKind, ConstantClass};
+use esl_bytecode::kind::{ArgumentKind, ConstantClass, ParameterKinds};
 use esl_bytecode::symbol::Symbol;
 
 use super::form::{constant_value, is_constant, on_one_line, plain, quoted};
@@ -12,42 +10,13 @@ use super::form::{constant_value, is_constant, on_one_line, plain, quoted};
 /// Characters of a lambda list that a message shows.
 const SHOWN: usize = 60;
 
-/// Kinds of the parameters of a builtin.
-struct BuiltinKinds {
-    positional: Vec<Option<ArgumentKind>>,
-    /// Kind of the arguments after these.
-    rest: Option<ArgumentKind>,
-}
-
-static KINDS: LazyLock<Vec<BuiltinKinds>> = LazyLock::new(|| {
-    let kinds = BUILTINS.iter().map(|info| {
-        let mut kinds = BuiltinKinds { positional: Vec::new(), rest: None };
-        // The library may give NIL for what it does not want.
-        if info.visibility == Visibility::Internal {
-            return kinds;
-        }
-        let mut is_rest = false;
-        for word in info.lambda_list.split_whitespace() {
-            match word {
-                "&rest" => is_rest = true,
-                "&optional" => {}
-                name if is_rest => kinds.rest = ArgumentKind::of_parameter(name),
-                name => kinds.positional.push(ArgumentKind::of_parameter(name)),
-            }
-        }
-        kinds
-    });
-    kinds.collect()
-});
-
 /// Returns the first constant among the arguments of a builtin that it refuses, and what is wrong with it: "a
 /// number here, not the string `"2"`".
 pub(super) fn refused(builtin: Builtin, args: &[Datum]) -> Option<(&Datum, String)> {
-    let kinds = KINDS.get(builtin.number() as usize)?;
-    args.iter().enumerate().find_map(|(index, argument)| {
-        let kind = (*kinds.positional.get(index).unwrap_or(&kinds.rest))?;
-        Some((argument, refused_as(kind, argument)?))
-    })
+    let kinds = ParameterKinds::of(builtin);
+    args.iter()
+        .enumerate()
+        .find_map(|(index, argument)| Some((argument, refused_as(kinds.at(index)?, argument)?)))
 }
 
 /// As [`refused`], for the argument of a parameter of this name.

@@ -202,6 +202,7 @@ pub(super) fn proclamations(
     let make = Make(form.span);
     let mut failures = Vec::new();
     for specifier in &form.args {
+        failures.extend(declared_type(specifier));
         match declared_failures(expander, specifier, form)? {
             Some(declared) => failures.extend(declared),
             None => expander.declaration(specifier, &mut body, form, origin)?,
@@ -219,6 +220,22 @@ pub(super) fn proclamations(
     });
     let effects = specials.chain(written).chain(failures);
     Ok(make.cl("EVAL-WHEN", std::iter::once(always(make)).chain(effects)))
+}
+
+/// Returns the forms that note `(ftype type name*)`, the type of functions. Only analyses read them.
+fn declared_type(specifier: &Datum) -> Vec<Datum> {
+    let items = specifier.as_list().unwrap_or_default();
+    let [head, declared, names @ ..] = items.as_slice() else { return Vec::new() };
+    if !head.as_symbol().is_some_and(|symbol| symbol.is_cl("FTYPE")) {
+        return Vec::new();
+    }
+    let make = Make(specifier.span());
+    let named = names.iter().filter_map(|name| name.as_symbol());
+    let note = |name: &Symbol| {
+        let indicator = make.quote(make.symbol(&Symbol::esl("%FTYPE")));
+        make.call_esl("%PUT", [make.quote(make.symbol(name)), indicator, make.quote((*declared).clone())])
+    };
+    named.map(note).collect()
 }
 
 /// Returns the forms that note `(fails name cause*)`: the causes of failures that may leave the function

@@ -123,3 +123,4 @@ pub use chunk::{Chunk, Purpose};
 pub use expander::{Expander, Stop};
 pub use failure::{FailurePlace, MacroFailure};
 pub use unit::UnitFindings;
+pub use warning::AllowedWarnings;

@@ -7,7 +7,7 @@ pub(super) const AND_HERE: &str = "and here";
 
 /// Warnings that are not reported in the place of a form.
 #[derive(Clone, Debug)]
-pub(super) struct AllowedWarnings {
+pub struct AllowedWarnings {
     /// Place of the form.
     span: Span,
     /// Codes of the warnings.
@@ -21,7 +21,7 @@ impl AllowedWarnings {
     }
 
     /// Returns whether these include a warning of this code at this place.
-    pub(super) fn include(&self, code: &'static str, place: Span) -> bool {
+    pub fn include(&self, code: &'static str, place: Span) -> bool {
         let here = self.span;
         let is_inside = place.source == here.source && here.start <= place.start && place.end <= here.end;
         is_inside && self.codes.contains(&code)

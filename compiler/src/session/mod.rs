@@ -26,6 +26,7 @@ use esl_bytecode::span::SourceId;
 use crate::core::Core;
 use crate::cover::CountedPlace;
 use crate::diagnostic::{Renderer, Sources};
+pub use crate::expand::AllowedWarnings;
 use crate::expand::Expander;
 use crate::lower::SourceLines;
 use crate::reader::read_datum;
@@ -186,6 +187,11 @@ impl Texts {
     /// included. Takes them out, if they are kept.
     pub fn take_core(&mut self) -> Vec<Core> {
         self.0.forms.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Returns the warnings that forms allow, for those of analyses.
+    pub fn allowed(&self) -> &[AllowedWarnings] {
+        self.0.expander.allowed()
     }
 
     /// Returns the expansion so far, form by form, if the text is compiled for the sake of that.

@@ -44,7 +44,8 @@ pub(crate) const COPY_LIMIT: usize = 1 << 15;
 
 macro_rules! define_natives {
     ($( $(#[doc = $doc:literal])* $id:ident = $native:path, $visibility:ident $name:literal
-        ($lambda_list:literal) shares $shares:ident $(-> $results:ident)? $(slowly $slowly:literal)?; )*) => {
+        ($lambda_list:literal) shares $shares:ident $(-> $results:ident)?
+        $(gives $gives:ident $(or $or:ident)?)? $(tests $tests:ident)? $(slowly $slowly:literal)?; )*) => {
         /// The implementations, by the numbers of their rows. A row whose path names no function does not
         /// compile.
         pub(crate) static NATIVES: Natives = [$( $native ),*];

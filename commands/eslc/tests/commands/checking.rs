@@ -36,6 +36,19 @@ fn warnings_are_denied_and_allowed() {
         assert_eq!(found, Some(status), "{options:?}: {errors}");
         assert!(errors.contains(said) && said.is_empty() == errors.is_empty(), "{options:?}: {errors}");
     }
+    // Those of the analysis, too.
+    folder.file("turn.esl", "(defun turn (angle)\n  (sin angle))\n(print (turn (list 1)))\n");
+    for (options, status, said) in [
+        (&[][..], 0, "warning[wrong-type]: `turn` needs a number as `angle`, and gets a list"),
+        (&["--deny", "wrong-type"], 3, "error[wrong-type]"),
+        (&["--allow", "wrong-type"], 0, ""),
+    ] {
+        let (found, errors) = run(&folder, &[&["check"], options, &["turn.esl"]].concat());
+        assert_eq!(found, Some(status), "{options:?}: {errors}");
+        assert!(errors.contains(said) && said.is_empty() == errors.is_empty(), "{options:?}: {errors}");
+    }
+    folder.file("turn.esl", "(with-allowed-warnings (wrong-type)\n  (print (sin (list 1))))\n");
+    assert_eq!(run(&folder, &["check", "turn.esl"]), (Some(0), String::new()));
     // A program with denied warnings is not written.
     let (status, errors) = run(&folder, &["compile", "--deny", "warnings", "call.esl"]);
     assert_eq!(status, Some(3), "{errors}");

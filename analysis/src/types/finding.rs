@@ -1,0 +1,77 @@
+//! Warnings about calls that cannot succeed.
+
+use esl_bytecode::compile::MODULE_SOURCES;
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::span::Span;
+use esl_compiler::core::{NodeId, NodeKind};
+use esl_compiler::diagnostic::Sources;
+
+use super::calls::ArgumentNeed;
+use super::set::TypeSet;
+use super::walk::TypeWalk;
+
+/// Whether a place is in a text of the program, and not in a module that comes with the system.
+pub(super) fn is_of_program(sources: &Sources, span: Span) -> bool {
+    !sources.name(span.source).is_some_and(|name| name.starts_with(MODULE_SOURCES))
+}
+
+impl TypeWalk<'_> {
+    /// Warns of an argument that its function cannot take.
+    pub(super) fn warn(
+        &mut self,
+        node: NodeId,
+        name: &str,
+        argument: NodeId,
+        given: TypeSet,
+        need: &ArgumentNeed,
+    ) {
+        if self.guards > 0 || self.found.is_none() {
+            return;
+        }
+        let form = self.core_form();
+        let kind = form.kind(argument);
+        // The compiler warns of constant arguments of functions that it knows.
+        if need.parameter.is_none() && matches!(kind, NodeKind::Constant(_)) {
+            return;
+        }
+        let needed = need.kind.map_or_else(|| self.noun(need.types), |kind| kind.noun().into());
+        let passed = self.noun(given);
+        let name = name.to_lowercase();
+        let message = match &need.parameter {
+            Some((parameter, _)) => {
+                let parameter = parameter.name().to_lowercase();
+                format!("`{name}` needs {needed} as `{parameter}`, and gets {passed}")
+            }
+            None if name.starts_with("a slot") => format!("{name} belongs to {needed}, and not to {passed}"),
+            None => format!("`{name}` needs {needed}, and gets {passed}"),
+        };
+        let span = form.core.nodes[argument.index()].span;
+        let call = form.core.nodes[node.index()].span;
+        let at = if span == Span::default() { call } else { span };
+        let mut found = Diagnostic::new("wrong-type", Severity::Warning, message, at);
+        found = found.label(format!("this is {passed}"));
+        if let NodeKind::Local(variable) = kind {
+            let bound = form.core.variables[variable.index()].span;
+            if bound != Span::default() && bound != at {
+                found = found.also(bound, format!("the variable is bound here, to {passed}"));
+            }
+        }
+        if let Some((_, fact)) = &need.parameter
+            && let Some(place) = fact.needed_at
+        {
+            found = found.also(place, format!("{needed} is needed here"));
+        }
+        if let Some(all) = &mut self.found {
+            all.push(found);
+        }
+    }
+
+    /// Returns a type as messages name it.
+    pub(super) fn noun(&self, types: TypeSet) -> String {
+        let names = self.definitions.names(types.classes);
+        if types.values == esl_bytecode::kind::ValueType::INSTANCE && !names.is_empty() {
+            return format!("an instance of {}", names.join(" or "));
+        }
+        types.values.noun()
+    }
+}

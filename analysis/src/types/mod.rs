@@ -1,0 +1,53 @@
+//! Types, where they are certain: calls that cannot succeed in any run.
+//!
+//! For each function of the program, *success types* are inferred: a superset of the arguments with which a
+//! call may return, and a superset of its results (Lindahl and Sagonas 2006). A call is warned of only if an
+//! argument has no value in common with the need of the function. The types of the functions written in Rust
+//! are those of the builtin table; functions of the library in ESL take and return anything here.
+//!
+//! The core of a form is walked in the order of evaluation, with the known types of its variables: after
+//! `(+ x 1)` has returned, `x` was a number. A predicate tells more in its branches. Summaries of functions
+//! begin with "never returns" and grow until nothing changes; types are sets of few bits, so this ends. A
+//! variable that is assigned has all values that it is ever given.
+//!
+//! Functions that a program may change at run time are not trusted: those that are defined twice, have
+//! methods, are mocked, or are named in data. If a clause of a recovery form may put a value in the place of
+//! that of a failed builtin, no conclusion is drawn from the calls of builtins.
+
+mod calls;
+mod declared;
+mod finding;
+mod program;
+mod refine;
+mod set;
+mod walk;
+
+use esl_bytecode::diagnostic::Diagnostic;
+use esl_compiler::diagnostic::Sources;
+
+use crate::forms::CoreForms;
+use program::ProgramDefinitions;
+use walk::TypeWalk;
+
+/// Walks of one form until all that is left to know of it counts as unknown.
+const MOST_WALKS: u32 = 40;
+
+/// Returns warnings about calls that cannot succeed, and about declared types that cannot hold.
+pub(crate) fn findings(forms: &CoreForms, sources: &Sources) -> Vec<Diagnostic> {
+    let definitions = ProgramDefinitions::new(forms);
+    let mut walk = TypeWalk::new(forms, &definitions);
+    let mut walks = vec![0; forms.forms.len()];
+    while let Some(form) = walk.take_pending() {
+        walks[form] += 1;
+        if walks[form] > MOST_WALKS {
+            walk.give_up(form);
+        } else {
+            walk.form(form);
+        }
+    }
+    let mut found = walk.report(sources);
+    found.extend(declared::findings(&walk, sources));
+    found.sort_by_key(|found| (found.primary.span.source, found.primary.span.start, found.message.clone()));
+    found.dedup_by(|one, other| one.primary.span == other.primary.span && one.message == other.message);
+    found
+}

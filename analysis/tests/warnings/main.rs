@@ -1,0 +1,4 @@
+//! The warnings of `eslc check` that the analysis gives.
+
+mod orders;
+mod types;
