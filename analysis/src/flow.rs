@@ -23,6 +23,9 @@ use crate::value::{
 pub(crate) const DEPTH: usize = 3;
 /// Most pieces of code, contexts told apart, until contexts are no longer told apart.
 const MOST_CODE: usize = 20_000;
+/// Most arrivals of values until the analysis is given up: in programs that pass many closures through data,
+/// they grow with the square of the closures, or worse.
+const MOST_ARRIVALS: usize = 4_000_000;
 
 /// A place that looks at the values that arrive in a cell.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -122,6 +125,10 @@ enum FlowArrival {
 #[derive(Debug)]
 pub(crate) struct ValueFlow<'a> {
     pub(crate) forms: &'a CoreForms,
+    /// Most calls in a context of this analysis.
+    depth: usize,
+    /// Values that have been sent to watchers.
+    sent: usize,
     pub(crate) cell_keys: Numbering<CellKey>,
     cells: Vec<FlowCell>,
     pub(crate) names: Numbering<Symbol>,
@@ -145,13 +152,15 @@ pub(crate) struct ValueFlow<'a> {
 }
 
 impl<'a> ValueFlow<'a> {
-    /// Creates an analysis that has not seen any code.
-    pub(crate) fn new(forms: &'a CoreForms) -> ValueFlow<'a> {
+    /// Creates an analysis that has not seen any code, with at most `depth` calls in a context.
+    pub(crate) fn new(forms: &'a CoreForms, depth: usize) -> ValueFlow<'a> {
         let spot = Spot { form: u32::MAX, node: NodeId(0), context: NO_CONTEXT };
         let mut contexts = Numbering::default();
         contexts.number(&(spot, NO_CONTEXT));
         ValueFlow {
             forms,
+            depth,
+            sent: 0,
             cell_keys: Numbering::default(),
             cells: Vec::new(),
             names: Numbering::default(),
@@ -262,6 +271,10 @@ impl<'a> ValueFlow<'a> {
             return;
         }
         place.watchers.push(watcher.clone());
+        self.sent += place.values.len();
+        if self.sent > MOST_ARRIVALS {
+            return;
+        }
         // Those on their way arrive in the new watcher too, which does no harm.
         let values = place.values.iter();
         self.arrivals.extend(values.map(|value| FlowArrival::Watcher(watcher.clone(), *value)));
@@ -299,7 +312,7 @@ impl<'a> ValueFlow<'a> {
         if !self.calls_arguments.contains(&(code.form, code.lambda.0)) {
             return code.context;
         }
-        if self.running.len() > MOST_CODE {
+        if self.depth == 0 || self.running.len() > MOST_CODE {
             return NO_CONTEXT;
         }
         let bare = Spot { context: NO_CONTEXT, ..spot };
@@ -315,7 +328,7 @@ impl<'a> ValueFlow<'a> {
             context = outer;
         }
         row.insert(0, bare);
-        row.truncate(DEPTH);
+        row.truncate(self.depth);
         let mut result = NO_CONTEXT;
         for called in row.into_iter().rev() {
             result = ContextId(self.contexts.number(&(called, result)).0);
@@ -323,9 +336,14 @@ impl<'a> ValueFlow<'a> {
         result
     }
 
-    /// Looks at all code and all values until there are no new ones.
+    /// Returns whether the analysis was given up because too many values flow: what it has found is a part.
+    pub(crate) fn was_given_up(&self) -> bool {
+        self.sent > MOST_ARRIVALS
+    }
+
+    /// Looks at all code and all values until there are no new ones, or too many.
     pub(crate) fn solve(&mut self) {
-        loop {
+        while !self.was_given_up() {
             if let Some(number) = self.unread.pop_front() {
                 let code = self.running[number].code;
                 self.read(code);
@@ -333,6 +351,7 @@ impl<'a> ValueFlow<'a> {
             }
             match self.arrivals.pop_front() {
                 Some(FlowArrival::Cell(cell, value)) => {
+                    self.sent += self.cells[cell.index()].watchers.len();
                     for index in 0..self.cells[cell.index()].watchers.len() {
                         let watcher = self.cells[cell.index()].watchers[index].clone();
                         self.arrive(&watcher, value);

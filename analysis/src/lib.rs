@@ -73,12 +73,14 @@ pub fn causes_of_the_library() -> impl Iterator<Item = &'static str> {
 }
 
 /// Analyses a program: its top-level forms, and the sources that their places refer to. Returns the table,
-/// and the explanation of a cause if one was asked for.
+/// and the explanation of a cause if one was asked for. If too many values flow, the table has the findings
+/// of the types only, and says that it [is incomplete](FailureTable::is_incomplete).
 pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -> (FailureTable, String) {
     let forms = CoreForms::new(cores);
-    let mut flow = solved(&forms);
-    add_uncalled(&mut flow, sources);
-    flow.solve();
+    let findings = types::findings(&forms, sources);
+    let Some(mut flow) = solved(&forms, Some(sources)) else {
+        return (FailureTable { is_incomplete: true, findings, ..FailureTable::default() }, String::new());
+    };
     // Computed causes without a known value.
     for spot in std::mem::take(&mut flow.computed) {
         if !flow.fails_at(spot) {
@@ -90,7 +92,7 @@ pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -
     let maker = Maker { flow: &flow, solution: &solution, sources, all: options.all, numbers };
     let explanation = options.explained.as_ref().map(|cause| maker.explain(cause)).unwrap_or_default();
     let mut table = maker.table();
-    table.findings.extend(types::findings(&forms, sources));
+    table.findings.extend(findings);
     (table, explanation)
 }
 
@@ -136,17 +138,28 @@ pub fn causes_of_function(name: &str) -> Vec<String> {
 pub fn resource_orders(cores: Vec<Core>) -> Vec<Diagnostic> {
     let forms = CoreForms::new(cores);
     // Programs without resources are many.
-    if orders::single_resources(&forms).len() < 2 { Vec::new() } else { orders::findings(&solved(&forms)) }
+    if orders::single_resources(&forms).len() < 2 {
+        return Vec::new();
+    }
+    solved(&forms, None).map(|flow| orders::findings(&flow)).unwrap_or_default()
 }
 
-/// Looks at the top-level forms of a program, and at all that these run.
-fn solved(forms: &CoreForms) -> ValueFlow<'_> {
-    let mut flow = ValueFlow::new(forms);
-    for form in 0..forms.forms.len() {
-        flow.run(Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT });
-    }
-    flow.solve();
-    flow
+/// Looks at the top-level forms of a program, and at all that these run; with `sources`, at its functions
+/// that nothing calls, too. If too many values flow, contexts are not told apart, which takes less; if there
+/// are still too many, returns nothing.
+fn solved<'a>(forms: &'a CoreForms, sources: Option<&Sources>) -> Option<ValueFlow<'a>> {
+    [flow::DEPTH, 0].into_iter().find_map(|depth| {
+        let mut flow = ValueFlow::new(forms, depth);
+        for form in 0..forms.forms.len() {
+            flow.run(Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT });
+        }
+        flow.solve();
+        if let Some(sources) = sources {
+            add_uncalled(&mut flow, sources);
+            flow.solve();
+        }
+        (!flow.was_given_up()).then_some(flow)
+    })
 }
 
 /// Looks at the program's own functions without a call, and at those that call their arguments, apart

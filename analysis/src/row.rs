@@ -162,4 +162,7 @@ pub struct FailureTable {
     pub declared: BTreeMap<String, Vec<String>>,
     /// Declarations that do not hold, clauses that never apply, and other warnings.
     pub findings: Vec<esl_bytecode::diagnostic::Diagnostic>,
+    /// Whether so many values flow in the program that the search for failures was given up: the table has
+    /// none.
+    pub is_incomplete: bool,
 }

@@ -175,6 +175,7 @@ impl Maker<'_, '_> {
             of_modules: self.of_modules(),
             declared: self.declared(),
             findings: self.findings(),
+            is_incomplete: false,
         };
         table.findings.extend(self.unhandled(&table.tasks));
         table.findings.extend(self.advice());

@@ -346,3 +346,22 @@ fn tasks_are_compared_with_their_declarations() {
     check_findings(&text(":drive :jammed"), &[]);
     check_findings(&text(":main"), &[]);
 }
+
+/// Functions that all call each other as elements of one list, each from a place of its own.
+fn functions_that_call_each_other(count: usize) -> String {
+    let makers: String = (0..count)
+        .map(|number| {
+            format!("(push (lambda (x) (dolist (next *all*) (funcall next (list x {number} next)))) *all*)\n")
+        })
+        .collect();
+    format!("(defvar *all* nil)\n{makers}(defun more (x) (+ 1 x)) (print (more 'a))")
+}
+
+#[test]
+fn what_grows_with_the_square_of_the_functions_is_given_up() {
+    assert!(!table(&functions_that_call_each_other(20)).is_incomplete);
+    let large = table(&functions_that_call_each_other(1200));
+    assert!(large.is_incomplete && large.functions.is_empty());
+    let codes: Vec<&str> = large.findings.iter().map(|found| found.code).collect();
+    assert_eq!(codes, ["wrong-type"], "the types are found all the same");
+}

@@ -8,7 +8,7 @@ use esl::program;
 use esl_analysis::render::{InjectedOutcomes, TableFormat, render, render_fmea, render_graph};
 use esl_analysis::{AnalysisOptions, FailureTable, analyze};
 use esl_command as command;
-use esl_command::{NOT_COMPILED, SUCCESS, USAGE};
+use esl_command::{FAILED, NOT_COMPILED, SUCCESS, USAGE};
 
 use crate::{SourceOptions, print, print_diagnostics, read};
 
@@ -137,6 +137,12 @@ fn analysed(
         return Err(NOT_COMPILED);
     }
     let (table, explanation) = analyze(cores, &compiled.sources, wanted);
+    if table.is_incomplete {
+        command::complain(format_args!(
+            "the failures of this program cannot be listed: too many functions flow through it as values; try parts of it"
+        ));
+        return Err(FAILED);
+    }
     Ok(AnalysedProgram { compiled, table, explanation })
 }
 

@@ -127,7 +127,7 @@ pub fn mission_of(file: &Path, path: &ModulePath) -> MissionPicture {
             return None;
         }
         let (table, _) = analyze(cores, &compiled.sources, &AnalysisOptions::default());
-        Some(render_graph(&table, &name))
+        (!table.is_incomplete).then(|| render_graph(&table, &name))
     })
 }
 
