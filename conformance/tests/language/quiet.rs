@@ -21,6 +21,7 @@ const MEANT: &[(&str, &str, usize)] = &[
     ("docs/tutorial/5-tasks.md", "unknown-module", 1),
     ("docs/tutorial/6-tests.md", "unknown-module", 1),
     ("docs/tutorial/7-schedules.md", "unknown-module", 2),
+    ("docs/tutorial/9-possible-failures.md", "unknown-module", 1),
     ("docs/manual/modules.md", "unknown-module", 1),
 ];
 
