@@ -109,16 +109,20 @@ fn check_upgrade(folder: &Path, file: &Path, library: &[std::path::PathBuf]) -> 
 fn print_rehearsal(rehearsal: &Rehearsal) {
     let Rehearsal { upgrade, stretch, arrivals, alike, others, named, left_out, errors, ended, .. } =
         rehearsal;
-    let time = humantime::format_duration(Duration::from_millis(stretch.as_millis() as u64));
-    let copy = match upgrade {
-        Some(_) => format!("on a copy of the run as it was {time} ago"),
-        None => format!("on a run that begins with it, for {time}"),
-    };
-    say!(
-        "{copy}, with the {} that the run had: {} made as by the run, {others} others, {left_out} left out",
-        counted(*arrivals, "message"),
-        counted(*alike, "call"),
-    );
+    if arrivals + alike + others + left_out == 0 {
+        say!("its past has no messages and no calls to try the program on");
+    } else {
+        let time = humantime::format_duration(Duration::from_millis(stretch.as_millis() as u64));
+        let copy = match upgrade {
+            Some(_) => format!("on a copy of the run as it was {time} ago"),
+            None => format!("on a run that begins with it, for {time}"),
+        };
+        say!(
+            "{copy}, with the {} that the run had: {} made as by the run, {others} others, {left_out} left out",
+            counted(*arrivals, "message"),
+            counted(*alike, "call"),
+        );
+    }
     named.iter().for_each(|(seconds, call)| say!("  after {seconds:.1} s: {call}"));
     if others > &named.len() {
         say!("  and {} more", others - named.len());

@@ -73,9 +73,8 @@ fn definitions_are_made_in_flight() {
     let (status, output, errors) = tried(&agent);
     assert_eq!(status, Some(0), "{output}{errors}");
     let expected = "on a copy of the run: 3 definitions; not definitions, and not run: `(exit 8)`\n\
-                    on a run that begins with it, for ";
-    assert!(output.contains(expected), "{output}");
-    assert!(output.ends_with(" had: 0 calls made as by the run, 0 others, 0 left out\n"), "{output}");
+                    its past has no messages and no calls to try the program on\n";
+    assert!(output.ends_with(expected), "{output}");
     assert_eq!(journal(&agent), before, "neither has written anything");
     // The upgraded run is killed too; then the new program is its program.
     let errors = kill_behind(agent.start(&["--upgrade"]), "40 cm");
