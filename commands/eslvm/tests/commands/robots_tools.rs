@@ -156,7 +156,9 @@ const MANAGED: &str = "(require :log)
 (wait-until *node* :on *ready*)
 (ros:define-property level *node* \"/level\" \"std_msgs/msg/Int32\" :field :data :initial 0)
 (ros:wait-for-subscriber *node* \"/rosout\" :timeout 60)
-(log:warn \"battery low\" :volts 11.5)
+(spawn (:daemon t)
+  ;; A subscriber may be seen before messages reach it.
+  (do-every 0.5 (log:warn \"battery low\" :volts 11.5)))
 (wait-until (> level 5))
 (say (list :level level))
 (sleep 1000)";
