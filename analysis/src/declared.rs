@@ -8,7 +8,7 @@ use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::LambdaId;
 
 use crate::cause::{Applies, clause_applies, is_above_cause};
-use crate::forms::DeclaredCauses;
+use crate::forms::{CoreForms, DeclaredCauses};
 use crate::guard::LeavingFailures;
 use crate::row::{FailingTask, FailureTable};
 use crate::table::{Maker, shown_function};
@@ -45,6 +45,32 @@ impl FailureTable {
         }
         all
     }
+}
+
+/// Returns the declared causes of functions, by their names.
+pub(crate) fn declared(forms: &CoreForms) -> BTreeMap<String, Vec<String>> {
+    let row = |(name, declared): (&Symbol, &DeclaredCauses)| {
+        let causes = declared.causes.iter().map(|cause| cause.to_string().to_lowercase());
+        (shown_function(name), causes.collect())
+    };
+    forms.declared.iter().map(row).collect()
+}
+
+/// Returns errors for the declarations of a program whose failures are not found: a promise that nothing has
+/// checked is not kept.
+pub(crate) fn unchecked(forms: &CoreForms) -> Vec<Diagnostic> {
+    let found = |(name, declared): (&Symbol, &DeclaredCauses)| {
+        let (form, node) = declared.place;
+        let span = forms.forms[form].core.nodes[node.index()].span;
+        let message = format!(
+            "the failures declared for `{}` are not checked: too many functions flow through the program as values",
+            shown_function(name)
+        );
+        Diagnostic::new("undeclared-failure", Severity::Error, message, span)
+    };
+    let mut findings: Vec<Diagnostic> = forms.declared.iter().map(found).collect();
+    findings.sort_by_key(|found| (found.primary.span.source, found.primary.span.start));
+    findings
 }
 
 impl Maker<'_, '_> {
@@ -145,15 +171,6 @@ impl Maker<'_, '_> {
             (found.primary.span.source, found.primary.span.start, found.message.clone())
         });
         findings
-    }
-
-    /// Returns the declared causes of functions, by their names.
-    pub(crate) fn declared(&self) -> BTreeMap<String, Vec<String>> {
-        let row = |(name, declared): (&Symbol, &DeclaredCauses)| {
-            let causes = declared.causes.iter().map(|cause| cause.to_string().to_lowercase());
-            (shown_function(name), causes.collect())
-        };
-        self.flow.forms.declared.iter().map(row).collect()
     }
 
     fn leaving_main(&self) -> LeavingFailures {

@@ -73,13 +73,17 @@ pub fn causes_of_the_library() -> impl Iterator<Item = &'static str> {
 }
 
 /// Analyses a program: its top-level forms, and the sources that their places refer to. Returns the table,
-/// and the explanation of a cause if one was asked for. If too many values flow, the table has the findings
-/// of the types only, and says that it [is incomplete](FailureTable::is_incomplete).
+/// and the explanation of a cause if one was asked for. If too many values flow, the table has only the
+/// findings of the types and an error for each declaration of failures, and says that it
+/// [is incomplete](FailureTable::is_incomplete).
 pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -> (FailureTable, String) {
     let forms = CoreForms::new(cores);
-    let findings = types::findings(&forms, sources);
+    let mut findings = types::findings(&forms, sources);
     let Some(mut flow) = solved(&forms, Some(sources)) else {
-        return (FailureTable { is_incomplete: true, findings, ..FailureTable::default() }, String::new());
+        findings.extend(declared::unchecked(&forms));
+        let declared = declared::declared(&forms);
+        let table = FailureTable { declared, findings, is_incomplete: true, ..FailureTable::default() };
+        return (table, String::new());
     };
     // Computed causes without a known value.
     for spot in std::mem::take(&mut flow.computed) {

@@ -10,7 +10,7 @@ use esl_compiler::diagnostic::Sources;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::cause::{MISTAKES, cause_of_condition};
-use crate::declared::SCRIPTED;
+use crate::declared::{SCRIPTED, declared};
 use crate::effect::{FailureKind, NodeEffect, Reason};
 use crate::flow::ValueFlow;
 use crate::forms::ScopeKind;
@@ -173,7 +173,7 @@ impl Maker<'_, '_> {
             forms: self.handling_forms(),
             goals: self.goals(),
             of_modules: self.of_modules(),
-            declared: self.declared(),
+            declared: declared(self.flow.forms),
             findings: self.findings(),
             is_incomplete: false,
         };

@@ -32,7 +32,7 @@ pub struct esl_durable {
     process: Process,
 }
 
-/// Where a durable run stands in this process.
+/// The stage of a durable run in this process.
 pub(crate) enum Stage {
     /// It gets its functions.
     Preparing(Box<Preparation>),

@@ -1,4 +1,4 @@
-//! Where the writer of a journal stands: what the next generation begins with.
+//! The state of the writer of a journal: what the next generation begins with.
 
 use std::collections::BTreeMap;
 

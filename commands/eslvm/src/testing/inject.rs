@@ -87,6 +87,12 @@ impl LoadedFile {
                 let program = compiled.program.take().ok_or(NOT_COMPILED)?;
                 let cores = std::mem::take(&mut compiled.core);
                 let (table, _) = analyze(cores, &compiled.sources, &AnalysisOptions::default());
+                if table.is_incomplete {
+                    complain(format_args!(
+                        "the failures of the mocks in {} are not found: too many functions flow through it as values",
+                        file.display()
+                    ));
+                }
                 (program, table.causes_by_name())
             }
         };
