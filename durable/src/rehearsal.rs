@@ -94,10 +94,42 @@ impl PastScript {
     }
 }
 
+/// What one look into the inbox has found, and the time of it.
+struct PastBatch {
+    time: u64,
+    contents: Vec<Incoming>,
+}
+
 /// The outside of a rehearsal.
 struct ScriptedHost {
     inner: VirtualHost,
     script: Arc<Mutex<PastScript>>,
+    /// What has not come yet.
+    batches: VecDeque<PastBatch>,
+    /// The time of the batch that comes next, if `inner` has it.
+    next: Option<u64>,
+}
+
+impl ScriptedHost {
+    /// Lets the next batch come. Only one comes at a time: batches that have the same time in the records were
+    /// found one after the other, and a signal is lost on a task that does not wait yet.
+    fn let_come(&mut self) {
+        let now = self.inner.monotonic();
+        if self.inner.inbox().is_rung() || self.next.is_some_and(|time| time > now) {
+            return;
+        }
+        self.next = self.batches.pop_front().map(|batch| {
+            for incoming in batch.contents {
+                self.arrive(batch.time, incoming);
+            }
+            batch.time
+        });
+    }
+
+    fn arrive(&mut self, time: u64, incoming: Incoming) {
+        let inner = std::mem::take(&mut self.inner);
+        self.inner = inner.with_arrival(time, incoming);
+    }
 }
 
 fn lock(script: &Mutex<PastScript>) -> MutexGuard<'_, PastScript> {
@@ -121,6 +153,7 @@ impl World {
         inner.advance(begun);
         let (mut now, mut arrivals) = (begun, 0);
         let mut calls: HashMap<u64, (u32, u64)> = HashMap::new();
+        let mut batches = VecDeque::new();
         for noted in records {
             match &noted.record {
                 Record::Monotonic(time) | Record::Due((_, time)) => now = now.max(*time),
@@ -135,8 +168,14 @@ impl World {
                     script.answers.entry(noted.question.0).or_default().push_back(noted.record.clone());
                 }
                 Record::Received((_, contents)) => {
+                    let mut batch = PastBatch { time: now, contents: Vec::new() };
                     for incoming in contents {
                         match incoming {
+                            // It has the machine wait for what comes later.
+                            Incoming::SenderCame => {
+                                inner = inner.with_arrival(now, incoming.clone());
+                                continue;
+                            }
                             Incoming::Operation { news: News::Progress(_), .. }
                             | Incoming::Stop
                             | Incoming::Interlude
@@ -155,16 +194,19 @@ impl World {
                             }
                             _ => {}
                         }
-                        inner = inner.with_arrival(now, incoming.clone());
+                        batch.contents.push(incoming.clone());
+                    }
+                    if !batch.contents.is_empty() {
+                        batches.push_back(batch);
                     }
                 }
                 _ => {}
             }
         }
-        inner = inner.with_arrival(end.max(now), Incoming::Stop);
+        batches.push_back(PastBatch { time: end.max(now), contents: vec![Incoming::Stop] });
         let (captured, stretch) = (inner.captured(), Duration::from_nanos(end.saturating_sub(begun)));
         let script = Arc::new(Mutex::new(script));
-        let host = ScriptedHost { inner, script: script.clone() };
+        let host = ScriptedHost { inner, script: script.clone(), batches, next: None };
         (World { script, captured, arrivals, stretch }, host)
     }
 
@@ -201,6 +243,7 @@ impl Host for ScriptedHost {
     }
 
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        self.let_come();
         // Everything that comes is in the script.
         self.inner.wait(deadline, Awaited { input: false, ..awaited })
     }
@@ -290,8 +333,8 @@ impl Host for ScriptedHost {
                 (0, News::Failed(HostFailure::new("NOT-IN-THIS-WORLD", call.name)))
             }
         };
-        let inner = std::mem::take(&mut self.inner);
-        self.inner = inner.with_arrival(now.saturating_add(time), Incoming::Operation { number, news });
+        drop(script);
+        self.arrive(now.saturating_add(time), Incoming::Operation { number, news });
     }
 
     fn inbox(&self) -> Inbox {

@@ -1,7 +1,7 @@
 //! Calls that last: the next process makes them again, and their objects stand in for those of the program.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -80,6 +80,13 @@ fn rows(inbox: &Inbox, told: Sender<String>) -> HostRows {
     rows
 }
 
+/// Returns the place for a run, without what a process of the same number has left there.
+fn fresh_folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("esl-{name}-{}", std::process::id()));
+    drop(std::fs::remove_dir_all(&folder));
+    folder
+}
+
 /// Runs the program in one process until the orders are carried out. Returns what the host was told.
 fn process(folder: &Path, snapshots: SnapshotEvery, orders: &[i64]) -> Vec<String> {
     let (told, heard): (_, Receiver<String>) = channel();
@@ -116,8 +123,7 @@ fn process(folder: &Path, snapshots: SnapshotEvery, orders: &[i64]) -> Vec<Strin
 #[test]
 fn calls_that_last_are_made_again_until_they_are_closed() {
     for snapshots in [SnapshotEvery::Never, SnapshotEvery::Bytes(1)] {
-        let name = format!("esl-lasting-{}-{snapshots:?}", std::process::id());
-        let folder = std::env::temp_dir().join(name.replace(['(', ')'], ""));
+        let folder = fresh_folder("lasting");
         let open = ["open side", "open front", "enter kitchen by front"];
         let knock = "knock at front of kitchen";
         let all = |more: &[&'static str]| [&open, more].concat();
@@ -148,7 +154,7 @@ fn rehearsed(folder: &Path, text: &str, back: Duration) -> Rehearsal {
 
 #[test]
 fn another_program_takes_the_past_of_a_run() {
-    let folder = std::env::temp_dir().join(format!("esl-rehearsed-{}", std::process::id()));
+    let folder = fresh_folder("rehearsed");
     let knock = "knock at front of kitchen";
     let heard = process(&folder, SnapshotEvery::Never, &[1, 1, 2]);
     assert!(heard.ends_with(&[knock, knock, "shut"].map(String::from)), "{heard:?}");
