@@ -70,6 +70,7 @@ mod coming_from {
         plexil = "plexil.md",
         python = "python.md",
         rclpy = "rclpy.md",
+        remote_agent = "remote-agent.md",
     }
 }
 
