@@ -17,8 +17,9 @@ simulated time a line of telemetry comes without being asked for, before the ans
     < {"time": 12.0, "attitude": "turning", "battery": 68.5, "error": 0.31}
 
 SPEED is how many seconds are simulated in one. Faults come by SEED: a wheel sticks, the star tracker is
-blinded, the camera hangs, a transmission is lost, the spacecraft is pushed, the battery drains. Now and then
-the connection drops and cannot be made for a while; what was under way is stopped then, without an answer.
+blinded, the camera hangs, a transmission is lost, the spacecraft is pushed, the battery drains. The main pair
+of thrusters always fails when it has fired for half of its time. Now and then the connection drops and cannot
+be made for a while; what was under way is stopped then, without an answer.
 
 The simulator ends when its executive has been away for 200 seconds of simulated time. Its exit status is 0 if the
 spacecraft points at the sun then, and the executive has broken no rule: two commands to the wheels at
@@ -51,11 +52,17 @@ ATTITUDES = {
     "volcano": [-0.2, 0.0, 0.15],
     "canyon": [0.0, -0.3, 0.1],
     "pole": [0.3, 0.1, 0.0],
+    "course": [-0.1, 0.1, 0.25],
 }
 """Attitudes by name, as modified Rodrigues parameters."""
 
-DURATIONS = {"slew": 5, "reset-wheel": 5, "switch-tracker": 2, "expose": 4, "cycle-camera": 8, "transmit": 6}
-"""Seconds that each command takes; a slew also takes as long as the turn does."""
+DURATIONS = {"slew": 5, "reset-wheel": 5, "switch-tracker": 2, "expose": 4, "cycle-camera": 8, "transmit": 6,
+             "fire": 0, "warm": 25}
+"""Seconds that each command takes; a slew also takes as long as the turn does, and thrusters fire for as long as
+they are told."""
+
+THRUST = 20.0
+"""Newtons of a pair of thrusters."""
 
 
 class Body:
@@ -196,6 +203,14 @@ class Spacecraft:
                 self.body.turn_wheel(command["fault"][1], False)
             elif self.chance(5):
                 command["fault"] = ("tracker-blinded",)
+        elif do == "fire":
+            seconds = float(command.get("seconds", 0))
+            if self.attitude() != "course":
+                return self.fail(number, "misaligned")
+            if self.has_faults and command.get("pair") == "main":
+                seconds /= 2
+                command["fault"] = ("thruster-failed", "main")
+            command["until"] = self.body.now + seconds
         elif do == "expose" and self.chance(12):
             command["until"] = float("inf")
         elif do == "transmit" and self.chance(15):
@@ -238,6 +253,8 @@ class Spacecraft:
             self.body.push.extTorquePntB_B = [[random.uniform(-20, 20)] for _ in range(3)]
         else:
             self.body.push.extTorquePntB_B = [[0.0], [0.0], [0.0]]
+        is_firing = any(command["do"] == "fire" for command in self.under_way.values())
+        self.body.push.extForce_B = [[0.0], [0.0], [THRUST if is_firing else 0.0]]
         self.answers.append({
             "time": round(self.body.now, 1),
             "attitude": self.attitude(),

@@ -11,7 +11,7 @@ use esl_conformance::chapter::{Example, examples};
 
 /// Findings that a text shows on purpose: the file, the code, and how many there are.
 const MEANT: &[(&str, &str, usize)] = &[
-    // Operations of the host, which `simulated.esl` or a world defines.
+    // Operations of the host, which `link.esl` or a world defines.
     ("examples/spacecraft/executive.esl", "undefined-function", 6),
     ("docs/tutorial/1-hello.md", "undefined-function", 1),
     // The tutorial makes these files on its way.

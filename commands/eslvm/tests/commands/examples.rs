@@ -182,28 +182,44 @@ pub(crate) fn start_simulator(
     (child, output, port)
 }
 
-/// Flies a spacecraft that is simulated elsewhere.
-fn fly(port: &str, speed: &str, targets: &[&str]) -> process::Finished {
+/// Flies a spacecraft that is simulated elsewhere, by this program of its folder.
+fn fly(program: &str, port: &str, speed: &str, targets: &[&str]) -> process::Finished {
     let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "--speed", speed]);
-    command.arg(example("spacecraft/simulated.esl")).arg(port).args(targets);
+    command.arg(example("spacecraft").join(program)).arg(port).args(targets);
     process::finish_within(process::start(&mut command), PATIENCE)
 }
 
-/// The executive that flies in the world of scripts flies behind a connection, which drops on the way.
-#[test]
-fn the_executive_flies_by_lines_of_json() {
-    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "--speed", "10"]);
+/// Flies the stand-in by this program. Returns how the flight has ended, after a check that no rule is broken.
+fn fly_stand_in(program: &str, speed: &str, targets: &[&str]) -> process::Finished {
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "--speed", speed]);
     command.arg(example("spacecraft/stand-in.esl")).arg("0");
     let (mut simulator, mut output, port) = start_simulator(&mut command);
-    let flight = fly(&port, "10", &["crater", "ridge"]);
+    let flight = fly(program, &port, speed, targets);
     simulator.kill().expect("it runs");
     simulator.wait().expect("it ends");
     let mut said = String::new();
     output.read_to_string(&mut said).expect("output is text");
     assert_eq!(flight.status, Some(0), "{}{}", flight.output, flight.errors);
+    assert_eq!(said, "", "no rule is broken");
+    flight
+}
+
+/// The executive that flies in the world of scripts flies behind a connection, which drops on the way.
+#[test]
+fn the_executive_flies_by_lines_of_json() {
+    let flight = fly_stand_in("simulated.esl", "10", &["crater", "ridge"]);
     assert!(flight.output.ends_with("pointing at SUN\n"), "{}", flight.output);
     assert!(flight.output.contains("the link is down\n"), "{}", flight.output);
-    assert_eq!(said, "", "no rule is broken");
+}
+
+/// A day as a plan is repaired behind a connection, too.
+#[test]
+fn the_day_is_repaired_behind_a_connection() {
+    let flight = fly_stand_in("simulated-day.esl", "80", &[]);
+    let broken = "burn has broken the plan: (:failed :thruster-failed \"main\")\n";
+    for line in [broken, "burn by the spare pair\n", "course corrected, sent crater"] {
+        assert!(flight.output.contains(line), "{line}: {}", flight.output);
+    }
 }
 
 #[test]
@@ -216,7 +232,7 @@ fn the_executive_flies_what_basilisk_simulates() {
     let mut command = Command::new("python3");
     command.arg("-B").arg(example("spacecraft/simulator.py")).args(["--port", "0", "--speed", "10"]);
     let (simulator, mut output, port) = start_simulator(&mut command);
-    let flight = fly(&port, "10", &["crater"]);
+    let flight = fly("simulated.esl", &port, "10", &["crater"]);
     let done = process::finish_within(simulator, PATIENCE);
     let mut said = String::new();
     output.read_to_string(&mut said).expect("output is text");
