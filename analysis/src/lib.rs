@@ -56,6 +56,8 @@ pub use row::{
     CauseRow, ClauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow, GoalMethod,
     GoalRow, HandlingForm,
 };
+#[doc(hidden)]
+pub use types::{LibraryTypes, library_types, table_of_library};
 pub use value::TaskKind;
 
 /// Options of an analysis.

@@ -9,6 +9,7 @@ pub mod folder;
 pub mod process;
 pub mod programs;
 pub mod transcript;
+pub mod trials;
 
 use std::path::Path;
 

@@ -94,7 +94,7 @@ impl PastScript {
     }
 }
 
-/// What one look into the inbox has found, and the time of it.
+/// Events that one look into the inbox has found, and the time of it.
 struct PastBatch {
     time: u64,
     contents: Vec<Incoming>,
@@ -104,15 +104,15 @@ struct PastBatch {
 struct ScriptedHost {
     inner: VirtualHost,
     script: Arc<Mutex<PastScript>>,
-    /// What has not come yet.
+    /// Batches that have not come yet.
     batches: VecDeque<PastBatch>,
     /// The time of the batch that comes next, if `inner` has it.
     next: Option<u64>,
 }
 
 impl ScriptedHost {
-    /// Lets the next batch come. Only one comes at a time: batches that have the same time in the records were
-    /// found one after the other, and a signal is lost on a task that does not wait yet.
+    /// Lets the next batch come. Only one comes at a time: batches that have the same time in the records
+    /// were found one after the other, and a signal is lost on a task that does not wait yet.
     fn let_come(&mut self) {
         let now = self.inner.monotonic();
         if self.inner.inbox().is_rung() || self.next.is_some_and(|time| time > now) {

@@ -5,6 +5,7 @@ use esl_bytecode::kind::{ArgumentKind, ParameterKinds, ValueType};
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::{Callee, Lambda, NodeId, NodeKind};
 
+use super::library;
 use super::program::FunctionKey;
 use super::set::{KnownFacts, TypeSet, VariableFact};
 use super::walk::TypeWalk;
@@ -72,7 +73,7 @@ impl TypeWalk<'_> {
             Callee::Builtin(builtin) => self.call_builtin(node, *builtin, arguments, types, known),
             Callee::Global(symbol) => match self.definitions.functions.get(symbol) {
                 Some(key) => self.call_function(node, symbol, *key, (arguments, types), spreads, known),
-                None => TypeSet::ANY,
+                None => self.call_library(node, symbol, arguments, types, known),
             },
             Callee::Local(variable) => match self.local[self.at].get(variable) {
                 Some(lambda) => {
@@ -147,7 +148,11 @@ impl TypeWalk<'_> {
         }
         let shown = name.to_string().to_lowercase();
         let mut succeeds = true;
-        for (place, index) in self.parameters_of(text, arguments) {
+        let positional = text.required.len() + text.optional.len();
+        let keywords =
+            text.keys.iter().flatten().map(|key| if key.key.is_keyword() { key.key.name() } else { "" });
+        let keys: Vec<&str> = keywords.collect();
+        for (place, index) in self.parameters_of(positional, &keys, arguments) {
             let Some(fact) = summary.parameters.get(index).copied() else { continue };
             let variable = parameter_variable(text, index).map(|variable| &core.variables[variable.index()]);
             let parameter = variable.map(|variable| (variable.name.clone(), fact));
@@ -157,17 +162,39 @@ impl TypeWalk<'_> {
         if succeeds { summary.result } else { TypeSet::ANY }
     }
 
-    /// Returns for each argument, by its place, the parameter that takes it, by its index.
-    fn parameters_of(&self, text: &Lambda, arguments: &[NodeId]) -> Vec<(usize, usize)> {
-        let positional = text.required.len() + text.optional.len();
+    /// Calls a function of the library that is written in ESL.
+    fn call_library(
+        &mut self,
+        node: NodeId,
+        symbol: &Symbol,
+        arguments: &[NodeId],
+        types: &[TypeSet],
+        known: &mut KnownFacts,
+    ) -> TypeSet {
+        let found = library::types_of(symbol).filter(|_| !self.definitions.changed.contains(symbol));
+        let Some(library) = found else { return TypeSet::ANY };
+        let keys: Vec<&str> = library.keys.iter().map(|(key, _)| key.as_str()).collect();
+        let of_keys = library.keys.iter().map(|(_, types)| types);
+        let needs: Vec<ValueType> = library.positional.iter().chain(of_keys).copied().collect();
+        let mut succeeds = true;
+        for (place, index) in self.parameters_of(library.positional.len(), &keys, arguments) {
+            let need = ArgumentNeed { types: TypeSet::of(needs[index]), kind: None, parameter: None };
+            succeeds &=
+                self.check_argument(node, symbol.name(), arguments[place], types[place], &need, known);
+        }
+        let is_known = succeeds && !self.definitions.substitutes;
+        if is_known { TypeSet::of(library.result) } else { TypeSet::ANY }
+    }
+
+    /// Returns for each argument, by its place, the parameter that takes it, by its index: first those by
+    /// position, then those of keys.
+    fn parameters_of(&self, positional: usize, keys: &[&str], arguments: &[NodeId]) -> Vec<(usize, usize)> {
         let mut pairs: Vec<(usize, usize)> =
             (0..arguments.len().min(positional)).map(|place| (place, place)).collect();
-        let keys = text.keys.as_deref().unwrap_or_default();
         let mut taken = vec![false; keys.len()];
         for place in (positional..arguments.len()).step_by(2) {
-            let key = self.core_form().symbol(arguments[place]);
-            let Some(key) = key else { break };
-            let found = keys.iter().position(|known| known.key == *key);
+            let Some(key) = self.core_form().symbol(arguments[place]) else { break };
+            let found = keys.iter().position(|known| key.is_keyword() && *known == key.name());
             if let Some(index) = found.filter(|index| !taken[*index] && place + 1 < arguments.len()) {
                 // Of two arguments for a key, the first counts.
                 taken[index] = true;

@@ -30,8 +30,8 @@ impl TypeWalk<'_> {
         }
         let form = self.core_form();
         let kind = form.kind(argument);
-        // The compiler warns of constant arguments of functions that it knows.
-        if need.parameter.is_none() && matches!(kind, NodeKind::Constant(_)) {
+        // The compiler warns of constant arguments of builtins.
+        if need.kind.is_some() && matches!(kind, NodeKind::Constant(_)) {
             return;
         }
         let needed = need.kind.map_or_else(|| self.noun(need.types), |kind| kind.noun().into());

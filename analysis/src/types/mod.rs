@@ -3,7 +3,8 @@
 //! For each function of the program, *success types* are inferred: a superset of the arguments with which a
 //! call may return, and a superset of its results (Lindahl and Sagonas 2006). A call is warned of only if an
 //! argument has no value in common with the need of the function. The types of the functions written in Rust
-//! are those of the builtin table; functions of the library in ESL take and return anything here.
+//! are those of the builtin table, those of the functions in ESL are inferred from the sources of the library
+//! when a test compares them with their table.
 //!
 //! The core of a form is walked in the order of evaluation, with the known types of its variables: after
 //! `(+ x 1)` has returned, `x` was a number. A predicate tells more in its branches. Summaries of functions
@@ -17,6 +18,7 @@
 mod calls;
 mod declared;
 mod finding;
+mod library;
 mod program;
 mod refine;
 mod set;
@@ -26,17 +28,29 @@ use esl_bytecode::diagnostic::Diagnostic;
 use esl_compiler::diagnostic::Sources;
 
 use crate::forms::CoreForms;
-use program::ProgramDefinitions;
+use program::{DefinedBy, ProgramDefinitions};
 use walk::TypeWalk;
+
+pub use library::{LibraryTypes, library_types, table_of_library};
 
 /// Walks of one form until all that is left to know of it counts as unknown.
 const MOST_WALKS: u32 = 40;
 
 /// Returns warnings about calls that cannot succeed, and about declared types that cannot hold.
 pub(crate) fn findings(forms: &CoreForms, sources: &Sources) -> Vec<Diagnostic> {
-    let definitions = ProgramDefinitions::new(forms);
+    let definitions = ProgramDefinitions::new(forms, DefinedBy::Program);
     let mut walk = TypeWalk::new(forms, &definitions);
-    let mut walks = vec![0; forms.forms.len()];
+    infer(&mut walk);
+    let mut found = walk.report(sources);
+    found.extend(declared::findings(&walk, sources));
+    found.sort_by_key(|found| (found.primary.span.source, found.primary.span.start, found.message.clone()));
+    found.dedup_by(|one, other| one.primary.span == other.primary.span && one.message == other.message);
+    found
+}
+
+/// Walks forms until nothing changes.
+fn infer(walk: &mut TypeWalk<'_>) {
+    let mut walks = vec![0; walk.forms.forms.len()];
     while let Some(form) = walk.take_pending() {
         walks[form] += 1;
         if walks[form] > MOST_WALKS {
@@ -45,9 +59,4 @@ pub(crate) fn findings(forms: &CoreForms, sources: &Sources) -> Vec<Diagnostic> 
             walk.form(form);
         }
     }
-    let mut found = walk.report(sources);
-    found.extend(declared::findings(&walk, sources));
-    found.sort_by_key(|found| (found.primary.span.source, found.primary.span.start, found.message.clone()));
-    found.dedup_by(|one, other| one.primary.span == other.primary.span && one.message == other.message);
-    found
 }

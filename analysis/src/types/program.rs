@@ -32,14 +32,24 @@ pub(super) struct ProgramDefinitions {
     pub(super) substitutes: bool,
     /// Forms that are too deep.
     pub(super) opaque: Vec<bool>,
+    /// Functions that may be others at run time than those of their names.
+    pub(super) changed: FxHashSet<Symbol>,
 }
 
 /// Internal functions that only note something under a name.
 const NOTING: &[&str] =
     &["%PUT", "%DEFINE-CAUSE", "%PROCLAIM-SPECIAL", "%PROCLAIM-NOTINLINE", "%SPAWN", "%SPAWN-NET"];
 
+/// The text whose definitions these are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum DefinedBy {
+    Program,
+    /// The library, whose functions no program can define anew: names in its data change nothing.
+    Library,
+}
+
 impl ProgramDefinitions {
-    pub(super) fn new(forms: &CoreForms) -> ProgramDefinitions {
+    pub(super) fn new(forms: &CoreForms, by: DefinedBy) -> ProgramDefinitions {
         let opaque = forms.forms.iter().map(|form| is_too_deep(&form.core)).collect();
         let mut found: FxHashMap<Symbol, Vec<FunctionKey>> = FxHashMap::default();
         let mut changed: FxHashSet<Symbol> = forms.generic.iter().cloned().collect();
@@ -48,7 +58,8 @@ impl ProgramDefinitions {
         let mut made: FxHashMap<Symbol, u32> = FxHashMap::default();
         for (index, form) in forms.forms.iter().enumerate() {
             for node in &form.core.nodes {
-                if let NodeKind::Constant(datum) = &node.kind
+                if by == DefinedBy::Program
+                    && let NodeKind::Constant(datum) = &node.kind
                     && matches!(datum.kind(), DatumKind::Cons(..) | DatumKind::Vector(_))
                 {
                     changed.extend(symbols_inside(datum));
@@ -90,13 +101,14 @@ impl ProgramDefinitions {
                             *made.entry(name).or_default() += 1;
                         }
                     }
-                    name if name.starts_with('%') && !NOTING.contains(&name) => {
+                    name if by == DefinedBy::Program && name.starts_with('%') && !NOTING.contains(&name) => {
                         changed.extend(arguments.iter().filter_map(|node| constant(Some(node))));
                     }
                     _ => {}
                 }
             }
         }
+        is_open &= by == DefinedBy::Program;
         let functions = found
             .into_iter()
             .filter(|(name, keys)| keys.len() == 1 && !is_open && !changed.contains(name))
@@ -108,6 +120,7 @@ impl ProgramDefinitions {
             bits: FxHashMap::default(),
             substitutes: substitutes(forms),
             opaque,
+            changed,
         };
         definitions.note_classes(forms, made);
         definitions

@@ -49,6 +49,32 @@ fn arguments_of_builtins_are_compared_with_their_table() {
 }
 
 #[test]
+fn functions_of_the_library_have_needs_and_results() {
+    check("(print (remove-if #'evenp 5))", &["`remove-if` needs a sequence, and gets an integer | 5 | "]);
+    check(
+        "(defun f (x) (+ 1 (prin1-to-string x)))",
+        &["`+` needs a number, and gets a string | (prin1-to-string x) | "],
+    );
+    // Through a function of the program.
+    check(
+        "(defun evens (numbers) (count-if #'evenp numbers))
+         (print (evens 'all)) (print (length (evens '(1 2))))",
+        &[
+            "`evens` needs a sequence as `numbers`, and gets a symbol | 'all | (count-if #'evenp numbers)",
+            "`length` needs a sequence, and gets a number | (evens '(1 2)) | ",
+        ],
+    );
+    check(
+        "(print (search \"a\" \"ba\" :start1 \"0\"))",
+        &["`search` needs a number, and gets a string | \"0\" | "],
+    );
+    check_none("(print (remove-if #'evenp \"ab\")) (print (funcall #'make-list 'a))");
+    // A function of the same name, one that a test scripts, and values in the place of failed calls.
+    check_none("(with-world ((:answer (prin1-to-string *) :with 5)) (print (+ 1 (prin1-to-string 5))))");
+    check_none("(print (with-recovery-procedures ((:type-error (x) \"a\")) (length (prin1-to-string 1))))");
+}
+
+#[test]
 fn calls_of_functions_are_compared_with_what_these_need() {
     check(
         "(defun area (width height) (* width height))
