@@ -56,6 +56,7 @@ pub use row::{
     CauseRow, ClauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow, GoalMethod,
     GoalRow, HandlingForm,
 };
+pub use types::{KnownField, MessageFields, compare_message_fields};
 #[doc(hidden)]
 pub use types::{LibraryTypes, library_types, table_of_library};
 pub use value::TaskKind;

@@ -71,10 +71,15 @@ impl TypeWalk<'_> {
         let (arguments, types) = (&arguments[..given], &types[..given]);
         match &callee {
             Callee::Builtin(builtin) => self.call_builtin(node, *builtin, arguments, types, known),
-            Callee::Global(symbol) => match self.definitions.functions.get(symbol) {
-                Some(key) => self.call_function(node, symbol, *key, (arguments, types), spreads, known),
-                None => self.call_library(node, symbol, arguments, types, known),
-            },
+            Callee::Global(symbol) => {
+                if !spreads {
+                    self.check_message(symbol, arguments);
+                }
+                match self.definitions.functions.get(symbol) {
+                    Some(key) => self.call_function(node, symbol, *key, (arguments, types), spreads, known),
+                    None => self.call_library(node, symbol, arguments, types, known),
+                }
+            }
             Callee::Local(variable) => match self.local[self.at].get(variable) {
                 Some(lambda) => {
                     let name = form.core.variables[variable.index()].name.clone();

@@ -18,7 +18,9 @@
 mod calls;
 mod declared;
 mod finding;
+mod handling;
 mod library;
+mod messages;
 mod program;
 mod refine;
 mod set;
@@ -28,10 +30,12 @@ use esl_bytecode::diagnostic::Diagnostic;
 use esl_compiler::diagnostic::Sources;
 
 use crate::forms::CoreForms;
+use messages::MessageTypes;
 use program::{DefinedBy, ProgramDefinitions};
 use walk::TypeWalk;
 
 pub use library::{LibraryTypes, library_types, table_of_library};
+pub use messages::{KnownField, MessageFields, compare_message_fields};
 
 /// Walks of one form until all that is left to know of it counts as unknown.
 const MOST_WALKS: u32 = 40;
@@ -41,6 +45,7 @@ pub(crate) fn findings(forms: &CoreForms, sources: &Sources) -> Vec<Diagnostic> 
     let definitions = ProgramDefinitions::new(forms, DefinedBy::Program);
     let mut walk = TypeWalk::new(forms, &definitions);
     infer(&mut walk);
+    walk.messages = MessageTypes::new(forms);
     let mut found = walk.report(sources);
     found.extend(declared::findings(&walk, sources));
     found.sort_by_key(|found| (found.primary.span.source, found.primary.span.start, found.message.clone()));

@@ -8,10 +8,10 @@ use esl_compiler::core::{BlockId, BoundVariable, LambdaId, NodeId, NodeKind, Par
 use esl_compiler::diagnostic::Sources;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::messages::MessageTypes;
 use super::program::{FunctionKey, ProgramDefinitions};
 use super::set::{KnownFacts, TypeSet, VariableFact};
-use crate::cause::may_be_mistake;
-use crate::forms::{CoreForm, CoreForms, ScopeKind};
+use crate::forms::{CoreForm, CoreForms};
 
 /// Summary of a function.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,6 +46,10 @@ pub(super) struct TypeWalk<'p> {
     exits: FxHashMap<BlockId, (KnownFacts, TypeSet)>,
     /// How many forms around this place take programming errors.
     pub(super) guards: u32,
+    /// How many take the failures of invalid messages.
+    pub(super) message_guards: u32,
+    /// The types of messages, in the last walk.
+    pub(super) messages: Option<MessageTypes>,
     /// Warnings, in the last walk.
     pub(super) found: Option<Vec<Diagnostic>>,
 }
@@ -68,6 +72,8 @@ impl<'p> TypeWalk<'p> {
             lambda: LambdaId(0),
             exits: FxHashMap::default(),
             guards: 0,
+            message_guards: 0,
+            messages: None,
             found: None,
         };
         for form in 0..count {
@@ -425,62 +431,4 @@ impl<'p> TypeWalk<'p> {
             None => types,
         }
     }
-
-    /// Walks a form that handles failures.
-    #[inline(never)]
-    fn handling(&mut self, kind: &NodeKind, known: &mut KnownFacts) -> TypeSet {
-        let before = known.clone();
-        match kind {
-            NodeKind::HandlerCase(body, clauses) => {
-                let guards = clauses.iter().any(|clause| {
-                    clause.condition_type.as_symbol().is_none_or(|name| takes_type_errors(name.name()))
-                });
-                let mut types = self.guarded(guards, *body, known);
-                for clause in clauses {
-                    let mut inside = before.clone();
-                    self.bind(&BoundVariable::Lexical(clause.variable), TypeSet::ANY, &mut inside);
-                    types = types.or(self.node(clause.body, &mut inside));
-                    known.join(inside);
-                }
-                types
-            }
-            NodeKind::Recovery { table, procedures, body } => {
-                self.node(*table, &mut known.clone());
-                self.node(*procedures, &mut known.clone());
-                let form = self.core_form();
-                let scope = form.scope_of[body.index()].map(|scope| &form.scopes[scope].kind);
-                let guards = match scope {
-                    Some(ScopeKind::Recovery { clauses, .. }) => {
-                        clauses.iter().any(|clause| may_be_mistake(self.forms, &clause.cause))
-                    }
-                    _ => true,
-                };
-                self.guarded(guards, *body, known);
-                *known = before;
-                TypeSet::ANY
-            }
-            NodeKind::Handlers(list, body) => {
-                self.node(*list, known);
-                self.guarded(true, *body, known)
-            }
-            NodeKind::Mask(height, body) => {
-                self.node(*height, known);
-                self.node(*body, known)
-            }
-            _ => TypeSet::ANY,
-        }
-    }
-
-    /// Walks a body, whose programming errors the form around it takes if `guards`.
-    fn guarded(&mut self, guards: bool, body: NodeId, known: &mut KnownFacts) -> TypeSet {
-        self.guards += u32::from(guards);
-        let types = self.node(body, known);
-        self.guards -= u32::from(guards);
-        types
-    }
-}
-
-/// Whether handlers for conditions of a type run for a value of a wrong type.
-fn takes_type_errors(name: &str) -> bool {
-    matches!(name, "T" | "CONDITION" | "SERIOUS-CONDITION" | "ERROR" | "TYPE-ERROR" | "SIMPLE-TYPE-ERROR")
 }

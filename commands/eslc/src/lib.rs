@@ -6,6 +6,8 @@
 mod failures;
 mod format;
 mod import;
+#[cfg(feature = "robots")]
+mod messages;
 mod new;
 mod rights;
 mod warnings;
@@ -244,6 +246,8 @@ const HABITS: command::Habits = &[
 /// Runs the command line of the process, and returns its exit status.
 pub fn main() -> u8 {
     command::add_modules();
+    #[cfg(feature = "robots")]
+    esl_analysis::compare_message_fields(messages::fields);
     let status = match command::parse::<Eslc>("eslc check", HABITS).action {
         EslcAction::Compile { files, output: Some(output), compiling } => {
             compile(&files, &output, Modules::Inside, &compiling)

@@ -137,3 +137,57 @@ fn a_wrong_subcommand_is_told_what_to_type() {
         assert!(errors.contains(wanted), "{errors}");
     }
 }
+
+const MESSAGES: &str = r#"(require :ros)
+(defun answer (node)
+  (ros:with-service (node "/reset" "std_srvs/srv/SetBool") (request)
+    (list :success (ros:field request :date))))
+(defun drive (node)
+  (let ((wheels (ros:advertise node "/cmd_vel" "geometry_msgs/msg/Twist"))
+        (battery (ros:subscribe node "/battery" "sensor_msgs/msg/BatteryState"))
+        (markers (ros:message "visualization_msgs/msg/MarkerArray")))
+    (ros:publish wheels :linear '(:x 0.5 :w 1))
+    (ros:publish wheels :linear (list :x 0.5) :turn 1)
+    (print (ros:field (wait-for-event battery) :voltge))
+    (let ((message (wait-for-event battery)))
+      (print (ros:field message :header :stamp :seconds)))
+    (print (ros:field markers :markers 0 :pose :place))
+    (ros:call-service node "/reset" "std_srvs/srv/SetBool" :datum t)
+    (ros:do-action node "/move" "nav2_msgs/action/NavigateToPose" :goal (list :position 1))
+    ;; Right ones, and some of which nothing is known.
+    (ros:publish wheels (list :angular '(:z 1)))
+    (print (ros:field (wait-for-event battery) :cell-voltage 0))
+    (print (ros:field (ros:field markers :markers 0) :pose :position :x))
+    (print (handler-case (ros:message "std_msgs/msg/String" :text 1) (failure () nil)))
+    (with-recovery-procedures ((:invalid-message (abort nil)))
+      (ros:message "std_msgs/msg/String" :text 1))
+    (ros:message "my_msgs/msg/Grip" :force 1)))
+"#;
+
+#[test]
+fn fields_of_messages_are_those_of_their_types() {
+    let folder = Folder::with("checking-messages", &[("drive.esl", MESSAGES)]);
+    let (status, errors) = run(&folder, &["check", "drive.esl"]);
+    assert_eq!(status, Some(0), "{errors}");
+    let found: Vec<&str> =
+        errors.lines().filter_map(|line| line.strip_prefix("warning[unknown-keyword]: ")).collect();
+    let expected = [
+        "`std_srvs/srv/SetBool_Request` has no field `:date`",
+        "`geometry_msgs/msg/Vector3` has no field `:w`",
+        "`geometry_msgs/msg/Twist` has no field `:turn`",
+        "`sensor_msgs/msg/BatteryState` has no field `:voltge`",
+        "`builtin_interfaces/msg/Time` has no field `:seconds`",
+        "`geometry_msgs/msg/Pose` has no field `:place`",
+        "`std_srvs/srv/SetBool_Request` has no field `:datum`",
+        "`nav2_msgs/action/NavigateToPose_Goal` has no field `:position`",
+    ];
+    assert_eq!(found, expected, "{errors}");
+    assert!(errors.contains("its fields are `:linear`, `:angular`"), "{errors}");
+    // A type that the program defines has the fields that it says.
+    let own = MESSAGES
+        .replace("(require :ros)", "(require :ros)(ros:define-message \"geometry_msgs/msg/Twist\" \"\")");
+    folder.file("drive.esl", &own);
+    let (_, errors) = run(&folder, &["check", "drive.esl"]);
+    assert!(!errors.contains("msg/Twist` has"), "{errors}");
+    assert_eq!(errors.matches("has no field").count(), 6, "{errors}");
+}

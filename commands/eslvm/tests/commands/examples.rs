@@ -189,7 +189,8 @@ fn fly(program: &str, port: &str, speed: &str, targets: &[&str]) -> process::Fin
     process::finish_within(process::start(&mut command), PATIENCE)
 }
 
-/// Flies the stand-in by this program. Returns how the flight has ended, after a check that no rule is broken.
+/// Flies the stand-in by this program. Returns how the flight has ended, after a check that no rule is
+/// broken.
 fn fly_stand_in(program: &str, speed: &str, targets: &[&str]) -> process::Finished {
     let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "--speed", speed]);
     command.arg(example("spacecraft/stand-in.esl")).arg("0");
