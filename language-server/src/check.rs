@@ -1,6 +1,7 @@
 //! Diagnostics: the compiler looks at a text on a thread of its own, once its editing pauses.
 
 use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -19,6 +20,7 @@ use lsp_types::{
 };
 
 use super::document::{ColumnUnit, OpenText, path_of, uri_of};
+use super::explored::marks;
 use super::inferred::{InferredText, InferredTexts};
 use super::project::Project;
 
@@ -43,6 +45,8 @@ struct CheckedText {
     text: String,
     path: ModulePath,
     unit: ColumnUnit,
+    /// Folders of the workspace.
+    roots: Vec<PathBuf>,
 }
 
 /// The thread that looks for diagnostics.
@@ -74,6 +78,7 @@ impl Checker {
             text: text.tree.source().to_owned(),
             path: project.module_path(&text.path()),
             unit: project.unit,
+            roots: project.roots.clone(),
         };
         _ = self.jobs.send(CheckJob::Check(Box::new(job)));
     }
@@ -200,7 +205,8 @@ fn shown(checked: &CheckedText, compiled: &Compiled) -> HashMap<String, Vec<Show
     let name = path_of(&checked.uri).display().to_string();
     let mut texts = ShownTexts { checked, name, compiled, known: HashMap::new() };
     let mut found: HashMap<String, Vec<ShownDiagnostic>> = HashMap::new();
-    found.insert(checked.uri.as_str().to_owned(), Vec::new());
+    let explored = marks(&checked.uri, &checked.text, checked.unit, &checked.roots);
+    found.insert(checked.uri.as_str().to_owned(), explored);
     if compiled.stopped.is_some() {
         let message = "the macros of this file have taken too much time or memory";
         let diagnostic = ShownDiagnostic { message: message.into(), ..ShownDiagnostic::default() };

@@ -20,6 +20,7 @@ mod definition;
 mod describe;
 mod document;
 mod expand;
+mod explored;
 mod failures;
 mod family;
 mod inferred;
@@ -45,10 +46,10 @@ use std::sync::mpsc;
 
 use lsp_server::{ErrorCode, Message, Notification, Request, Response};
 use lsp_types::notification::{
-    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument, Exit,
-    Notification as NotificationKind,
+    DidChangeTextDocument, DidChangeWatchedFiles, DidCloseTextDocument, DidOpenTextDocument,
+    DidSaveTextDocument, Exit, Initialized, Notification as NotificationKind,
 };
-use lsp_types::request::{Initialize, Request as _, Shutdown};
+use lsp_types::request::{Initialize, RegisterCapability, Request as _, Shutdown};
 use lsp_types::{
     CodeActionProviderCapability, CodeLensOptions, CompletionOptions, DocumentLinkOptions,
     DocumentOnTypeFormattingOptions, ExecuteCommandOptions, FoldingRangeProviderCapability,
@@ -120,7 +121,20 @@ struct ServedClient {
     /// The texts, once the client has said hello.
     greeted: Option<(Project, Checker)>,
     folders: Vec<PathBuf>,
+    /// Whether the client can be asked to watch files.
+    watches: bool,
     is_shut_down: bool,
+}
+
+/// Returns the request to watch files with findings of explorations.
+fn watch_request() -> Request {
+    let pattern = format!("**/*{}", explored::FINDINGS);
+    let registration = serde_json::json!({
+        "id": "findings", "method": DidChangeWatchedFiles::METHOD,
+        "registerOptions": { "watchers": [{ "globPattern": pattern }] },
+    });
+    let parameters = serde_json::json!({ "registrations": [registration] });
+    Request::new("findings".to_owned().into(), RegisterCapability::METHOD.to_owned(), parameters)
 }
 
 fn session(
@@ -128,12 +142,17 @@ fn session(
     sender: &mpsc::Sender<Value>,
     folders: Vec<PathBuf>,
 ) -> Result<ClientExit, ServeError> {
-    let mut session = ServedClient { greeted: None, folders, is_shut_down: false };
+    let mut session = ServedClient { greeted: None, folders, watches: false, is_shut_down: false };
     while let Some(frame) = read_frame(input)? {
         let answer = match frame {
             Ok(Message::Request(request)) => sent(Message::Response(session.answer(request, sender))),
             Ok(Message::Notification(notification)) if notification.method == Exit::METHOD => {
                 return Ok(session.exit());
+            }
+            Ok(Message::Notification(notification))
+                if notification.method == Initialized::METHOD && session.watches =>
+            {
+                sent(Message::Request(watch_request()))
             }
             Ok(Message::Notification(notification)) => {
                 if let Some((project, checker)) = &mut session.greeted {
@@ -191,6 +210,8 @@ impl ServedClient {
         let unit = unit_of(&parameters);
         let workspace = parameters.capabilities.workspace.as_ref();
         let of_lenses = workspace.and_then(|workspace| workspace.code_lens.as_ref());
+        let of_watching = workspace.and_then(|workspace| workspace.did_change_watched_files.as_ref());
+        self.watches = of_watching.and_then(|watching| watching.dynamic_registration).unwrap_or(false);
         let refreshes = of_lenses.and_then(|lenses| lenses.refresh_support).unwrap_or(false);
         let roots = parameters.workspace_folders.unwrap_or_default();
         let roots = roots.iter().map(|folder| path_of(&folder.uri)).collect();
@@ -230,6 +251,9 @@ fn take(project: &mut Project, checker: &Checker, notification: Notification) {
         DidSaveTextDocument::METHOD => {
             let Ok(saved) = parameters::<DidSaveTextDocument>(params) else { return };
             checker.check(project, &saved.text_document.uri);
+        }
+        DidChangeWatchedFiles::METHOD => {
+            project.open_uris().iter().for_each(|uri| checker.check(project, uri));
         }
         DidCloseTextDocument::METHOD => {
             let Ok(closed) = parameters::<DidCloseTextDocument>(params) else { return };

@@ -43,6 +43,11 @@ impl Project {
         self.texts.remove(uri.as_str());
     }
 
+    /// Returns the URIs of the open texts.
+    pub(super) fn open_uris(&self) -> Vec<Uri> {
+        self.texts.values().map(|text| text.uri.clone()).collect()
+    }
+
     pub(super) fn text(&self, uri: &Uri) -> Option<&OpenText> {
         self.texts.get(uri.as_str())
     }

@@ -22,6 +22,7 @@
 mod forms;
 mod late;
 mod library;
+mod orders;
 mod random;
 mod unseen;
 mod verdict;
@@ -37,6 +38,7 @@ use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Vm};
 pub use forms::SourceForms;
 pub use library::function_symbol;
+pub use orders::SeenOrders;
 pub use random::{RandomFound, RandomSettings, explore_randomly};
 pub use unseen::{UnseenChange, UnseenKind, counts_signals, reads_clock, unseen_changes};
 pub use verdict::{ExplorationScope, grains};

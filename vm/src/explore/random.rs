@@ -16,7 +16,8 @@ use std::collections::HashMap;
 use super::Settings;
 use super::follow::explore_by;
 use super::point::PointRun;
-use super::step::Runnable;
+use super::step::{Runnable, TellStep, tell_step, tell_uses};
+use super::tasks::watch_variables;
 use crate::run::RunOutcome;
 use crate::task::TaskNumber;
 use crate::vm::Vm;
@@ -118,9 +119,18 @@ impl Priorities {
 }
 
 impl Vm {
-    /// Runs the program by a random schedule.
-    pub fn run_randomly(&mut self, settings: &Settings, schedule: RandomSchedule) -> RandomRun {
+    /// Runs the program by a random schedule. `told`, if there is one, is told of the steps of tasks, and of
+    /// their uses of places that others may reach.
+    pub fn run_randomly(
+        &mut self,
+        settings: &Settings,
+        schedule: RandomSchedule,
+        mut told: Option<&mut TellStep<'_>>,
+    ) -> RandomRun {
         explore_by(self, settings);
+        self.scheduler.points.uses = told.is_some().then(Vec::new);
+        self.scheduler.points.objects.clear();
+        let mut watched = 0;
         let mut priorities = Priorities::new(schedule);
         let mut found = RandomRun { outcome: None, choices: Vec::new(), steps: 0, tasks: 0 };
         let mut seen = std::collections::HashSet::new();
@@ -131,6 +141,13 @@ impl Vm {
             found.steps += 1;
             if found.steps > MOST_STEPS {
                 return None;
+            }
+            if let Some(told) = &mut told {
+                tell_uses(vm, *told);
+                if watched != vm.names.symbol_count() {
+                    watch_variables(vm);
+                    watched = vm.names.symbol_count();
+                }
             }
             let number = |index| vm.scheduler.tasks.at(index).map_or(TaskNumber::NONE, |task| task.number);
             let mut alternatives: Vec<TaskNumber> =
@@ -149,8 +166,17 @@ impl Vm {
             if runnable.count() > 1 {
                 found.choices.push(choice);
             }
+            if let (None, Some(&index), Some(told)) =
+                (runnable.ways, runnable.tasks.get(choice as usize), &mut told)
+            {
+                tell_step(vm, index, *told);
+            }
             Some(choice)
         });
+        if let Some(told) = told {
+            tell_uses(self, told);
+        }
+        self.scheduler.points.uses = None;
         found.tasks = seen.len();
         self.end_following();
         found

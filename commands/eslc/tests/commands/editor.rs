@@ -22,12 +22,17 @@ pub(crate) struct Editor {
 impl Editor {
     /// Starts a server and says hello; its copies of the library go to `folder`.
     pub(crate) fn new(folder: &Folder) -> Editor {
+        Editor::with_capabilities(folder, json!({ "codeLens": { "refreshSupport": true } }))
+    }
+
+    /// As [`Editor::new`], for a client with these capabilities of the workspace.
+    pub(crate) fn with_capabilities(folder: &Folder, workspace: Value) -> Editor {
         let mut child = start(eslc(&["lsp"]).env("XDG_CACHE_HOME", folder.join("cache")));
         let input = child.stdin.take().expect("standard input is a pipe");
         let output = BufReader::new(child.stdout.take().expect("standard output is a pipe"));
         let mut editor = Editor { child, input, output, last_id: 0, told: Default::default() };
         let root = uri(&folder.path().display().to_string());
-        let capabilities = json!({ "workspace": { "codeLens": { "refreshSupport": true } } });
+        let capabilities = json!({ "workspace": workspace });
         let hello =
             json!({ "capabilities": capabilities, "workspaceFolders": [{ "uri": root, "name": "test" }] });
         let answer = editor.ask("initialize", hello);

@@ -424,3 +424,57 @@ fn forms_about_failures_and_tasks_stand_out() {
     assert_eq!(tokens["data"], expected);
     editor.end();
 }
+
+/// Findings of an exploration are marked where their steps are, as long as the text is as it was.
+#[test]
+fn findings_of_explorations_are_marked() {
+    let text = "(defvar *seen* 0)\n(defun see ()\n  (setq *seen* (1+ *seen*)))\n";
+    let folder = Folder::with("lsp_findings", &[("count.esl", text)]);
+    let main = folder.join("count.esl");
+    let watching = json!({ "didChangeWatchedFiles": { "dynamicRegistration": true } });
+    let mut editor = Editor::with_capabilities(&folder, watching);
+    let watched = loop {
+        let message = editor.receive();
+        if message["method"] == "client/registerCapability" {
+            break message["params"]["registrations"][0]["registerOptions"]["watchers"][0]["globPattern"]
+                .clone();
+        }
+    };
+    assert_eq!(watched, "**/*.findings.json");
+    editor.open(&main, text);
+    editor.diagnostics(&main, <[Value]>::is_empty);
+    let step = |kind: &str, task: &str, place: &str, text: &str| json!({ "kind": kind, "task": task, "place": place, "text": text });
+    let place = "count.esl:3:16";
+    let steps = json!([
+        step("read", "task LEFT", "count.esl:3:20", "reads *SEEN* = 0"),
+        json!({ "kind": "preemption", "text": "has to stop before", "stops": { "task": "task LEFT", "place": place } }),
+        step("set", "task RIGHT", "count.esl:3:3", "sets *SEEN* to 1"),
+        step("set", "task RIGHT", "missing.esl:3:3", "sets *SEEN* to 1"),
+        step("set", "task RIGHT", "count.esl:99:3", "sets *SEEN* to 1"),
+        json!(7),
+    ]);
+    let finding = json!({ "finding": "the program ends with status 1", "steps": steps, "schedule": "count-1.schedule" });
+    let found = json!({ "folder": folder.path(), "program": "count.esl", "findings": [finding] });
+    folder.file("count.findings.json", found.to_string());
+    folder.file("broken.findings.json", "[");
+    let changed = json!({ "uri": uri(&folder.join("count.findings.json")), "type": 1 });
+    editor.tell("workspace/didChangeWatchedFiles", json!({ "changes": [changed] }));
+    let told = editor.diagnostics(&main, |told| told.len() == 3);
+    let mark = told.iter().find(|mark| mark["severity"] == 2).expect("one is a warning");
+    assert_eq!(mark["range"]["start"], json!({ "line": 2, "character": 15 }), "{mark}");
+    assert_eq!(mark["range"]["end"], json!({ "line": 2, "character": 26 }), "{mark}");
+    let message = mark["message"].as_str().unwrap_or_default();
+    assert_eq!(
+        message,
+        "the program ends with status 1\nLEFT: has to stop before\nagain: eslvm run --schedule count-1.schedule count.esl"
+    );
+    let related = mark["relatedInformation"].as_array().expect("the steps are related");
+    let messages: Vec<&str> = related.iter().filter_map(|step| step["message"].as_str()).collect();
+    assert_eq!(messages, ["LEFT: reads *SEEN* = 0", "LEFT: has to stop before", "RIGHT: sets *SEEN* to 1"]);
+    // The text is another one now.
+    let change = json!({ "text": format!("{text}\n") });
+    let document = json!({ "uri": uri(&main), "version": 2 });
+    editor.tell("textDocument/didChange", json!({ "textDocument": document, "contentChanges": [change] }));
+    editor.diagnostics(&main, <[Value]>::is_empty);
+    editor.end();
+}

@@ -24,8 +24,10 @@ pub(crate) fn run_explore(
     library: &[PathBuf],
     is_quiet: bool,
 ) -> Result<u8, u8> {
-    if let Some(timeline) = &options.timeline {
-        command::refuse_overwriting(timeline, [file])?;
+    for output in
+        [&options.timeline, &options.svg, &options.findings, &options.progress].into_iter().flatten()
+    {
+        command::refuse_overwriting(output, [file])?;
     }
     let path = ModulePath::new([file], library);
     let mut read = None;
@@ -67,14 +69,14 @@ pub(crate) fn run_explore(
         let source = read.as_ref()?;
         program::compile_with_points(std::slice::from_ref(source), &path).program
     };
-    let time = std::time::Duration::from_secs(u64::from(options.time));
-    let (timeline, json) = (options.timeline.clone(), options.json);
+    let (time, json) = (options.time, options.json);
     let jobs = options.jobs.map_or_else(processors, usize::from);
     let random = options.random.map(|count| explore::RandomSettings {
         count,
         seed: options.seed.unwrap_or(1),
         depth: options.depth,
         jobs,
+        covers: options.progress.is_some(),
     });
     let (strict, deny_fragile) = (options.strict || !options.deny.is_empty(), !options.deny.is_empty());
     let is_endless = options.endless;
@@ -84,7 +86,10 @@ pub(crate) fn run_explore(
         jobs,
         time,
         is_endless,
-        timeline,
+        timeline: options.timeline.clone(),
+        svg: options.svg.clone(),
+        findings: options.findings.clone(),
+        progress: options.progress.clone(),
         strict,
         deny_fragile,
         random,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use esl::Config;
@@ -381,9 +382,9 @@ pub(crate) struct ExploreArguments {
     /// Most memory of the exploration, for states and for snapshots, such as 64M or 2G; less makes it slower
     #[arg(long, value_name = "SIZE", default_value = "512M", value_parser = parse_size)]
     pub(crate) memory: usize,
-    /// Most seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 60)]
-    pub(crate) time: u32,
+    /// Most time, in seconds or with a unit, such as 90, 10m or 8h
+    #[arg(long, value_name = "TIME", default_value = "60", value_parser = parse_time)]
+    pub(crate) time: Duration,
     /// When timers end: when all tasks wait (idle), or at any point, as if what tasks do took so long (any)
     #[arg(long, value_enum, default_value = "idle")]
     pub(crate) timers: TimersChoice,
@@ -407,9 +408,14 @@ pub(crate) struct ExploreArguments {
     /// End with status 1 if an update is fragile; implies --strict
     #[arg(long, value_name = "WHAT", value_parser = ["fragile"], conflicts_with = "random")]
     pub(crate) deny: Vec<String>,
-    /// Try N schedules with random priorities, in place of all schedules
+    /// Try N schedules with random priorities, in place of all schedules; without N, until the time is over
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(num_args = 0..=1, default_missing_value = "18446744073709551615")]
     pub(crate) random: Option<u64>,
+    /// Keep the progress of random schedules in a file, from which the same command goes on, and print which
+    /// places of the program came in both orders
+    #[arg(long, value_name = "FILE", requires = "random")]
+    pub(crate) progress: Option<PathBuf>,
     /// Seed of the first random schedule, by default 1; the next schedules have the next seeds
     #[arg(long, value_name = "SEED", requires = "random")]
     pub(crate) seed: Option<u64>,
@@ -424,6 +430,12 @@ pub(crate) struct ExploreArguments {
     /// for Perfetto
     #[arg(long, value_name = "FILE")]
     pub(crate) timeline: Option<PathBuf>,
+    /// Write a picture of the first finding to a file: the table of the tasks, in SVG
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+    /// Write the findings to a file, as JSON; editors show those of files that end in `.findings.json`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) findings: Option<PathBuf>,
     /// Print findings and figures as JSON, an object a line
     #[arg(long)]
     pub(crate) json: bool,
@@ -458,6 +470,14 @@ pub(crate) enum TimersChoice {
     Idle,
     /// At any point
     Any,
+}
+
+/// Parses a time: a number of seconds, or a number with a unit.
+fn parse_time(text: &str) -> Result<Duration, humantime::DurationError> {
+    match text.parse() {
+        Ok(seconds) => Ok(Duration::from_secs(seconds)),
+        Err(_) => humantime::parse_duration(text),
+    }
 }
 
 /// Parses the speed of the program's clock.

@@ -14,13 +14,15 @@ use esl::program::{Ended, Program};
 use esl_command::{FAILED, NOT_PROVED, SUCCESS, StatusLine, USAGE, complain, say};
 use esl_testing::explore::{
     Behaviour, Exploration, ExplorationScope, ExploredEnding, Fairness, Grain, Livelock, Prepare,
-    RandomSettings, ScheduleEvent, ScheduleStep, SearchLimit, SearchProgress, Settings, SourceForms,
-    TimerGrain, explore_together, grains, name_of_condition, shortest, tell_steps,
+    RandomSettings, ScheduleStep, SearchLimit, SearchProgress, Settings, SourceForms, TimerGrain,
+    explore_together, grains, name_of_condition, shortest, tell_steps,
 };
 use esl_timeline::Timeline;
 use esl_vm::vm::Vm;
-use serde_json::json;
+use serde_json::{Value as Json, json};
 
+mod picture;
+mod progress;
 mod random;
 mod strict;
 mod tell;
@@ -40,6 +42,12 @@ pub struct ExplorationOptions {
     pub is_endless: bool,
     /// File for a timeline of the first finding.
     pub timeline: Option<PathBuf>,
+    /// File for a picture of the first finding.
+    pub svg: Option<PathBuf>,
+    /// File for the findings as JSON, which editors show.
+    pub findings: Option<PathBuf>,
+    /// File for the progress of random schedules, from which a later run goes on.
+    pub progress: Option<PathBuf>,
     /// Whether uses of shared places that are safe by chance only are looked for, too.
     pub strict: bool,
     /// Whether these are an error.
@@ -85,12 +93,13 @@ pub fn run(
         options,
         started: Instant::now(),
         forms: RefCell::default(),
+        told: RefCell::default(),
     };
     let status = match options.random {
         Some(random) => session.try_random(random),
         None => session.try_all(),
     };
-    status.unwrap_or_else(|error| {
+    status.and_then(|status| session.write_findings().map(|()| status)).unwrap_or_else(|error| {
         complain(error);
         USAGE
     })
@@ -107,6 +116,8 @@ struct CommandExploration<'a> {
     options: &'a ExplorationOptions,
     started: Instant,
     forms: RefCell<SourceForms>,
+    /// The findings that were told, as JSON.
+    told: RefCell<Vec<Json>>,
 }
 
 /// The outcome of the searches at one grain after the other.
@@ -288,8 +299,7 @@ impl CommandExploration<'_> {
             false => finding.choices.clone(),
         };
         let schedule = Schedule::new(program, settings, choices.clone());
-        let written = std::fs::write(&name, schedule.to_string());
-        written.map_err(|error| TellError::Schedule(name.clone(), error))?;
+        write_file(Path::new(&name), &schedule.to_string())?;
         let timeline = options.timeline.as_ref().filter(|_| number == 1);
         let pictured = Mutex::new(None);
         let prepare = |machine: &mut Vm| {
@@ -309,36 +319,54 @@ impl CommandExploration<'_> {
             let told = timeline.and_then(Timeline::complete);
             told.map_err(TellError::Timeline)?;
         }
+        let last_again = match finding.repeated {
+            0 => None,
+            1 => Some("then the last switch again, and so on".to_owned()),
+            repeated => Some(format!("then the last {repeated} switches again, and so on")),
+        };
+        if let Some(file) = options.svg.as_ref().filter(|_| number == 1) {
+            let title = format!("{title}: {}", finding.what);
+            let report = last_again.iter().map(String::as_str).chain(finding.errors.lines());
+            write_file(file, &picture::draw(&title, &tell::rows(&steps, forms), report, forms))?;
+        }
+        if options.json || options.findings.is_some() {
+            let told = tell::finding(finding, title, settings, &steps, &name, forms);
+            if options.json {
+                say!("{told}");
+            }
+            self.told.borrow_mut().push(told);
+        }
         if options.json {
-            let switches = steps.iter().filter_map(|step| match &step.event {
-                ScheduleEvent::Switch(switch) => Some(tell::text(switch, forms)),
-                _ => None,
-            });
-            let switches: Vec<String> = switches.collect();
-            let (what, errors, repeated) = (&finding.what, &finding.errors, finding.repeated);
-            let told = tell::json(&steps, forms);
-            let kind = title.split(' ').next().unwrap_or("finding");
-            say!(
-                "{}",
-                json!({
-                    kind: what, "grain": settings.grain.name(), "timers": settings.timers.name(),
-                    "switches": switches, "steps": told, "repeated": repeated, "report": errors,
-                    "schedule": name,
-                })
-            );
             return Ok(steps);
         }
         say!("{title}: {}", finding.what);
         tell::lines(&steps, forms).iter().for_each(|line| say!("{line}"));
-        match finding.repeated {
-            0 => {}
-            1 => say!("  then the last switch again, and so on"),
-            repeated => say!("  then the last {repeated} switches again, and so on"),
+        if let Some(text) = last_again {
+            say!("  {text}");
         }
         finding.errors.lines().for_each(|line| say!("  {line}"));
         say!("  again: eslvm run --schedule {name} {}\n", self.file.display());
         Ok(steps)
     }
+
+    /// Writes the findings for editors, also if there are none, in place of those of an earlier exploration.
+    ///
+    /// # Errors
+    /// [`TellError::File`].
+    fn write_findings(&self) -> Result<(), TellError> {
+        let Some(file) = &self.options.findings else { return Ok(()) };
+        let folder = std::env::current_dir().map_err(|error| TellError::File(file.clone(), error))?;
+        let text = json!({ "folder": folder, "program": self.file, "findings": *self.told.borrow() });
+        write_file(file, &format!("{text}\n"))
+    }
+}
+
+/// Writes a text to a file.
+///
+/// # Errors
+/// [`TellError::File`].
+fn write_file(file: &Path, text: &str) -> Result<(), TellError> {
+    std::fs::write(file, text).map_err(|error| TellError::File(file.to_owned(), error))
 }
 
 /// Returns the ways in which runs end badly, the one with the fewest switches first.
@@ -378,8 +406,10 @@ fn schedule_name(file: &Path, number: usize) -> String {
 /// Reason why a finding cannot be told.
 #[derive(Debug)]
 enum TellError {
-    /// The file with the schedule, of this name, cannot be written.
-    Schedule(String, io::Error),
+    /// A file cannot be written: a schedule, a picture, findings, or progress.
+    File(PathBuf, io::Error),
+    /// The file of progress cannot be read, or is not one.
+    Progress(PathBuf, progress::ProgressError),
     /// The program cannot be begun again.
     Program(Error),
     /// The timeline cannot be written.
@@ -391,7 +421,8 @@ enum TellError {
 impl fmt::Display for TellError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            TellError::Schedule(name, error) => write!(f, "{name} cannot be written: {error}"),
+            TellError::File(file, error) => write!(f, "{} cannot be written: {error}", file.display()),
+            TellError::Progress(file, error) => write!(f, "{} {error}", file.display()),
             TellError::Program(error) => error.fmt(f),
             TellError::Timeline(error) => write!(f, "the timeline cannot be written: {error}"),
             TellError::NoSource => f.write_str("--strict needs the source of the program"),

@@ -6,29 +6,42 @@
 
 use std::collections::HashMap;
 
-use esl_testing::explore::{ScheduleEvent, ScheduleStep, SourceForms, StandingTask, Switch};
+use esl_testing::explore::{ScheduleEvent, ScheduleStep, Settings, SourceForms, StandingTask, Switch};
 use serde_json::{Value as Json, json};
+
+use super::Finding;
 
 /// Lines of a table; of more, the first and the last ones are shown.
 const TOLD_ROWS: usize = 40;
 
 /// Characters of a cell, and of the last column.
-const CELL: usize = 44;
+pub(super) const CELL: usize = 44;
 
 /// A line of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct StepRow {
-    time: u64,
+pub(super) struct StepRow {
+    pub(super) time: u64,
     /// The task; empty for the passing of time.
-    task: String,
-    text: String,
-    place: Option<String>,
-    kind: StepRowKind,
+    pub(super) task: String,
+    pub(super) text: String,
+    pub(super) place: Option<String>,
+    pub(super) kind: StepRowKind,
+}
+
+impl StepRow {
+    /// Returns the last column: the place, with its form unless the text is the form.
+    pub(super) fn place(&self, forms: &mut SourceForms) -> String {
+        match (&self.place, &self.kind) {
+            (Some(place), StepRowKind::Step) => place.clone(),
+            (Some(place), _) => forms.describe(place),
+            (None, _) => String::new(),
+        }
+    }
 }
 
 /// A kind of line, with what only JSON says of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum StepRowKind {
+pub(super) enum StepRowKind {
     Use { target: String, value: String, is_set: bool },
     Step,
     Switch(Switch),
@@ -36,13 +49,24 @@ enum StepRowKind {
 }
 
 /// Returns the name of a task in the head of a column.
-fn column_name(label: &str) -> String {
+pub(super) fn column_name(label: &str) -> String {
     let name = label.strip_prefix("task ").or_else(|| label.strip_prefix("the "));
     name.unwrap_or(label).to_owned()
 }
 
+/// Returns the tasks of lines, in the order in which they come.
+pub(super) fn tasks(rows: &[StepRow]) -> Vec<&str> {
+    let mut tasks: Vec<&str> = Vec::new();
+    for row in rows.iter().filter(|row| !row.task.is_empty()) {
+        if !tasks.contains(&row.task.as_str()) {
+            tasks.push(&row.task);
+        }
+    }
+    tasks
+}
+
 /// Returns the lines of a schedule.
-fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<StepRow> {
+pub(super) fn rows(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<StepRow> {
     let matters = uses_that_matter(steps);
     let mut rows: Vec<StepRow> = Vec::new();
     for (step, matters) in steps.iter().zip(matters) {
@@ -165,7 +189,7 @@ fn uses_that_matter(steps: &[ScheduleStep]) -> Vec<bool> {
 }
 
 /// Returns a text with at most so many characters.
-fn cut(text: &str, most: usize) -> String {
+pub(super) fn cut(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         Some((end, _)) => format!("{}…", text[..end].trim_end()),
         None => text.to_owned(),
@@ -175,12 +199,7 @@ fn cut(text: &str, most: usize) -> String {
 /// Returns a schedule as the lines of a table.
 pub(super) fn lines(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<String> {
     let rows = rows(steps, forms);
-    let mut tasks: Vec<&str> = Vec::new();
-    for row in rows.iter().filter(|row| !row.task.is_empty()) {
-        if !tasks.contains(&row.task.as_str()) {
-            tasks.push(&row.task);
-        }
-    }
+    let tasks = tasks(&rows);
     let length = |text: &str| text.chars().count();
     let width = |task: &&str| {
         let cells = rows.iter().filter(|row| row.task == *task).map(|row| length(&cut(&row.text, CELL)));
@@ -205,12 +224,7 @@ pub(super) fn lines(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Stri
         }
         let cell = |task: &&str| if row.task == *task { cut(&row.text, CELL) } else { String::new() };
         let cells: Vec<String> = tasks.iter().map(cell).collect();
-        let place = match (&row.place, &row.kind) {
-            (Some(place), StepRowKind::Step) => place.clone(),
-            (Some(place), _) => forms.describe(place),
-            (None, _) => String::new(),
-        };
-        lines.push(line(&time, &cells, &place));
+        lines.push(line(&time, &cells, &row.place(forms)));
     }
     lines
 }
@@ -221,7 +235,7 @@ pub(super) fn json(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Json>
     let item = |row: &StepRow| {
         let form = row.place.as_ref().and_then(|place| forms.text(place));
         let (time, task, place) = (seconds(row.time), &row.task, &row.place);
-        match &row.kind {
+        let mut item = match &row.kind {
             StepRowKind::Use { target, value, is_set } => json!({
                 "kind": if *is_set { "set" } else { "read" }, "time": time, "task": task, "variable": target,
                 "value": value, "place": place, "form": form,
@@ -231,13 +245,39 @@ pub(super) fn json(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Json>
             }
             StepRowKind::Switch(switch) => switch_json(time, switch, forms),
             StepRowKind::LeftOut(count) => json!({ "kind": "left-out", "count": count }),
-        }
+        };
+        item["text"] = row.text.clone().into();
+        item
     };
     rows.iter().map(item).collect()
 }
 
-fn seconds(time: u64) -> f64 {
+pub(super) fn seconds(time: u64) -> f64 {
     time as f64 / 1e9
+}
+
+/// Returns a finding under a title as JSON. `schedule` is the file that repeats it.
+pub(super) fn finding(
+    finding: &Finding,
+    title: &str,
+    settings: &Settings,
+    steps: &[ScheduleStep],
+    schedule: &str,
+    forms: &mut SourceForms,
+) -> Json {
+    let switches = steps.iter().filter_map(|step| match &step.event {
+        ScheduleEvent::Switch(switch) => Some(text(switch, forms)),
+        _ => None,
+    });
+    let switches: Vec<String> = switches.collect();
+    let (what, errors, repeated) = (&finding.what, &finding.errors, finding.repeated);
+    let told = json(steps, forms);
+    let kind = title.split(' ').next().unwrap_or("finding");
+    json!({
+        kind: what, "grain": settings.grain.name(), "timers": settings.timers.name(),
+        "switches": switches, "steps": told, "repeated": repeated, "report": errors,
+        "schedule": schedule,
+    })
 }
 
 fn switch_json(time: f64, switch: &Switch, forms: &mut SourceForms) -> Json {

@@ -6,7 +6,7 @@ use esl_conformance::process;
 use crate::eslvm;
 
 /// The radio may begin to wait after the camera has signalled.
-const LOST_SIGNAL: &str = "(defvar *picture* nil)
+pub(crate) const LOST_SIGNAL: &str = "(defvar *picture* nil)
 (defvar *taken* (make-event 'taken))
 (task-net
   (camera (setq *picture* t)
@@ -25,7 +25,8 @@ pub(crate) fn run(folder: &Folder, arguments: &[&str]) -> (Option<i32>, String, 
 fn a_finding_is_told_by_its_switches_and_repeated_by_its_schedule() {
     let folder = Folder::new("exploring-lost-signal");
     folder.file("lost.esl", LOST_SIGNAL);
-    let (status, output, errors) = run(&folder, &["explore", "--timeline", "lost.svg", "lost.esl"]);
+    let files = ["--timeline", "lost.svg", "--svg", "finding.svg", "--findings", "lost.findings.json"];
+    let (status, output, errors) = run(&folder, &[&["explore"], &files[..], &["lost.esl"]].concat());
     assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
     assert!(output.starts_with("finding 1: no task can ever run again\n  time  RADIO "), "{output}");
     assert!(output.contains("\n     0  reads *PICTURE* = NIL  "), "{output}");
@@ -37,6 +38,24 @@ fn a_finding_is_told_by_its_switches_and_repeated_by_its_schedule() {
     assert!(output.contains("\nviolation: findings: 1 (grain variables, timers idle; "), "{output}");
     let picture = std::fs::read_to_string(folder.path().join("lost.svg")).expect("the timeline is drawn");
     assert!(picture.contains("task RADIO"), "{picture}");
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("it is written");
+    let picture = read("finding.svg");
+    for text in [
+        "<title>finding 1: no task can ever run again</title>",
+        ">reads *PICTURE* = NIL</text>",
+        ">has to stop before</text>",
+        ">lost.esl:4:11: (setq *picture* t)</text>",
+        ">  task RADIO waits for event TAKEN, lost.esl:7:12</text>",
+        "prefers-color-scheme: dark",
+    ] {
+        assert!(picture.contains(text), "{text}: {picture}");
+    }
+    let found: serde_json::Value = serde_json::from_str(&read("lost.findings.json")).expect("it is JSON");
+    assert_eq!(
+        (&found["program"], &found["findings"][0]["schedule"]),
+        (&"lost.esl".into(), &"lost-1.schedule".into())
+    );
+    assert_eq!(found["findings"][0]["steps"][0]["text"], "reads *PICTURE* = NIL", "{found}");
     let (status, _, errors) = run(&folder, &["run", "--schedule", "lost-1.schedule", "lost.esl"]);
     assert_eq!(status, Some(4), "{errors}");
     assert!(errors.contains("task RADIO waits for event TAKEN, lost.esl:7:12"), "{errors}");
@@ -422,28 +441,4 @@ fn an_update_that_is_safe_by_chance_is_fragile() {
         output.contains("\nnot fragile: no schedule ends badly with switches before each use "),
         "{output}"
     );
-}
-
-/// Random schedules state their guarantee, and are repeated and resumed by their seeds.
-#[test]
-fn random_schedules_find_what_they_promise() {
-    let folder = Folder::new("exploring-random");
-    folder.file("lost.esl", LOST_SIGNAL);
-    let (status, output, errors) = run(&folder, &["explore", "--random", "100", "lost.esl"]);
-    assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
-    assert!(output.starts_with("finding 1: no task can ever run again\n  time  "), "{output}");
-    assert!(
-        output.contains("\nviolation: findings: 1 (grain variables, timers idle; 100 random schedules)\n"),
-        "{output}"
-    );
-    assert!(output.contains("of at least 1/(3 tasks * ") && output.contains(" steps^2) = "), "{output}");
-    assert!(output.ends_with("\nto go on: --seed 101\n"), "{output}");
-    assert_eq!(run(&folder, &["run", "--schedule", "lost-1.schedule", "lost.esl"]).0, Some(4));
-    folder.file("right.esl", "(task-net (one (print 1)) (two (print 2)))");
-    let few = ["explore", "--random", "10", "--seed", "31", "--depth", "2", "--json", "right.esl"];
-    let (status, output, errors) = run(&folder, &few);
-    assert_eq!((status, errors.as_str()), (Some(7), ""), "{output}");
-    let figures: serde_json::Value = serde_json::from_str(&output).expect("it is JSON");
-    assert_eq!((&figures["random"], &figures["next-seed"]), (&10.into(), &41.into()));
-    assert_eq!(run(&folder, &["explore", "--seed", "1", "right.esl"]).0, Some(2));
 }

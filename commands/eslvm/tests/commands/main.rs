@@ -27,6 +27,7 @@ mod endings;
 mod examples;
 mod exploring;
 mod exploring_endless;
+mod exploring_randomly;
 #[cfg(unix)]
 mod fleet;
 mod http;

@@ -14,11 +14,12 @@ fn random(text: &str, random: RandomSettings) -> (Settings, RandomFound) {
     let program = compile(text);
     let grain = *grains(&program, None).last().expect("there is a grain");
     let settings = Settings { grain, ..Settings::default() };
-    let found = explore_randomly(&program, &settings, random, &|_| Ok(()), &|_| true).expect("it can start");
+    let found = explore_randomly(&program, &settings, random, RandomFound::default(), &|_| Ok(()), &|_| true)
+        .expect("it can start");
     (settings, found)
 }
 
-const FEW: RandomSettings = RandomSettings { count: 150, seed: 1, depth: 3, jobs: 1 };
+const FEW: RandomSettings = RandomSettings { count: 150, seed: 1, depth: 3, jobs: 1, covers: false };
 
 #[test]
 fn most_faults_of_the_corpus_are_found_by_random_schedules() {

@@ -1,0 +1,173 @@
+//! Findings of explorations, as marks in the texts: `eslvm explore --findings FILE` has written them.
+//!
+//! Guarantees: a finding is shown only in a text that is as it was when the program was explored: as it is
+//! stored, and stored no later than the findings. Not here: when to look ([`super::check`]).
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use lsp_types::{
+    Diagnostic as ShownDiagnostic, DiagnosticRelatedInformation, DiagnosticSeverity, Location,
+    NumberOrString, Uri,
+};
+use serde_json::Value as Json;
+
+use super::document::{ColumnUnit, OpenText, path_of, uri_of};
+
+/// End of the names of files with findings.
+pub(super) const FINDINGS: &str = ".findings.json";
+/// Largest size of such a file that is read, in bytes.
+const MOST_BYTES: u64 = 8 << 20;
+/// Most findings that are shown in a text.
+const MOST_FINDINGS: usize = 50;
+
+/// Returns the marks of findings in a text. Their files are in its folder, or in those of the workspace.
+pub(super) fn marks(uri: &Uri, text: &str, unit: ColumnUnit, roots: &[PathBuf]) -> Vec<ShownDiagnostic> {
+    let path = path_of(uri);
+    let Some((stored, changed)) = stored(&path) else { return Vec::new() };
+    if stored != text {
+        return Vec::new();
+    }
+    let mut folders: Vec<&Path> =
+        path.parent().into_iter().chain(roots.iter().map(PathBuf::as_path)).collect();
+    folders.dedup();
+    let mut files: Vec<PathBuf> = folders.into_iter().flat_map(|folder| files_in(folder, changed)).collect();
+    files.sort();
+    files.dedup();
+    let mut marker = FindingMarker { path: &path, unit, texts: HashMap::new(), marks: Vec::new() };
+    let mut count = 0;
+    for file in files {
+        let Some(json) = fs::read(&file).ok().and_then(|bytes| serde_json::from_slice::<Json>(&bytes).ok())
+        else {
+            continue;
+        };
+        let folder = PathBuf::from(json["folder"].as_str().unwrap_or_default());
+        let program = json["program"].as_str().unwrap_or_default();
+        for finding in json["findings"].as_array().into_iter().flatten() {
+            if count < MOST_FINDINGS {
+                count += 1;
+                marker.mark(finding, &folder, program);
+            }
+        }
+    }
+    marker.marks
+}
+
+/// Returns the text of a file, and when it was changed.
+fn stored(path: &Path) -> Option<(String, SystemTime)> {
+    let changed = fs::metadata(path).ok()?.modified().ok()?;
+    Some((fs::read_to_string(path).ok()?, changed))
+}
+
+/// Returns the files with findings in a folder that were written at a time or later.
+fn files_in(folder: &Path, since: SystemTime) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let entries = entries.flatten().filter(|entry| entry.file_name().to_string_lossy().ends_with(FINDINGS));
+    let is_wanted = |entry: &fs::DirEntry| {
+        entry.metadata().is_ok_and(|found| {
+            found.len() <= MOST_BYTES && found.modified().is_ok_and(|written| written >= since)
+        })
+    };
+    entries.filter(is_wanted).map(|entry| entry.path()).collect()
+}
+
+/// A step of a finding.
+struct MarkedStep {
+    /// The task and what it does.
+    text: String,
+    /// Whether the task had to stop there, or was asked to end.
+    is_switch: bool,
+    /// The file and the place in it.
+    at: (PathBuf, Location),
+}
+
+/// Makes the marks in one text.
+struct FindingMarker<'a> {
+    path: &'a Path,
+    unit: ColumnUnit,
+    /// The texts of the steps, `None` for those that cannot be read.
+    texts: HashMap<PathBuf, Option<OpenText>>,
+    marks: Vec<ShownDiagnostic>,
+}
+
+impl FindingMarker<'_> {
+    /// Returns a place, as `file:line:column`, of a program that was explored in this folder.
+    fn at(&mut self, place: &str, folder: &Path) -> Option<(PathBuf, Location)> {
+        let mut parts = place.rsplitn(3, ':');
+        let column: usize = parts.next()?.parse().ok()?;
+        let line: usize = parts.next()?.parse().ok()?;
+        let path = fs::canonicalize(folder.join(parts.next()?)).ok()?;
+        let unit = self.unit;
+        let load = |path: &Path| {
+            let text = fs::read_to_string(path).ok()?;
+            Some(OpenText::new(uri_of(path)?, 0, text, unit))
+        };
+        let text = self.texts.entry(path.clone()).or_insert_with(|| load(&path)).as_ref()?;
+        let range = text.lines.range(line.checked_sub(1)?);
+        let in_line = text.tree.source().get(range.clone())?;
+        let start = range.start + in_line.char_indices().nth(column.checked_sub(1)?)?.0;
+        let node = text.tree.first_at(start);
+        let form = text.tree.nodes().contains(&node).then(|| text.tree.range(node));
+        let end = form.filter(|form| form.start == start).map_or(start, |form| form.end);
+        Some((path, text.location(start..end)))
+    }
+
+    /// Returns the steps of a finding that have a place.
+    fn steps(&mut self, finding: &Json, folder: &Path) -> Vec<MarkedStep> {
+        let mut steps = Vec::new();
+        for step in finding["steps"].as_array().into_iter().flatten() {
+            let standing = ["stops", "ends", "chooses"].iter().find_map(|key| step.get(key)).unwrap_or(step);
+            let (Some(task), Some(place), Some(text)) =
+                (standing["task"].as_str(), standing["place"].as_str(), step["text"].as_str())
+            else {
+                continue;
+            };
+            let is_switch = step.get("stops").is_some() || step.get("ends").is_some();
+            let text = format!("{}: {text}", task.strip_prefix("task ").unwrap_or(task));
+            if let Some(at) = self.at(place, folder) {
+                steps.push(MarkedStep { text, is_switch, at });
+            }
+        }
+        steps
+    }
+
+    fn mark(&mut self, finding: &Json, folder: &Path, program: &str) {
+        let kind = if finding.get("fragile").is_some() { "fragile" } else { "finding" };
+        let Some(what) = finding[kind].as_str() else { return };
+        let steps = self.steps(finding, folder);
+        let Some(main) = steps.iter().rposition(|step| step.is_switch).or(steps.len().checked_sub(1)) else {
+            return;
+        };
+        let own = fs::canonicalize(self.path).unwrap_or_else(|_| self.path.to_owned());
+        let related = steps.iter().map(|step| DiagnosticRelatedInformation {
+            location: step.at.1.clone(),
+            message: step.text.clone(),
+        });
+        let related: Vec<DiagnosticRelatedInformation> = related.collect();
+        let shown = |severity, at: &Location, message| ShownDiagnostic {
+            range: at.range,
+            severity: Some(severity),
+            code: Some(NumberOrString::String(kind.into())),
+            source: Some("eslvm explore".into()),
+            message,
+            ..ShownDiagnostic::default()
+        };
+        for (number, step) in steps.iter().enumerate().filter(|(_, step)| step.at.0 == own) {
+            if number == main {
+                let report = finding["report"].as_str().unwrap_or_default();
+                let schedule = finding["schedule"].as_str().unwrap_or_default();
+                let again = format!("again: eslvm run --schedule {schedule} {program}");
+                let lines = [what, &step.text, report.trim_end(), &again];
+                let lines: Vec<&str> = lines.into_iter().filter(|line| !line.is_empty()).collect();
+                let mark = shown(DiagnosticSeverity::WARNING, &step.at.1, lines.join("\n"));
+                let related_information = Some(related.clone());
+                self.marks.push(ShownDiagnostic { related_information, ..mark });
+            } else {
+                let message = format!("step {} of {}, {what}: {}", number + 1, steps.len(), step.text);
+                self.marks.push(shown(DiagnosticSeverity::INFORMATION, &step.at.1, message));
+            }
+        }
+    }
+}
