@@ -92,7 +92,7 @@ fn trial(info: &BuiltinInfo) -> Option<Trial> {
     }
     let needs = needs.into_iter().map(|need| need.unwrap_or(ValueType::ANY)).collect();
     let most = info.arity.max.unwrap_or(2).min(4);
-    let (name, counts) = (info.name.to_owned(), u32::from(info.arity.min)..=u32::from(most));
+    let (name, counts) = (info.name.to_owned(), info.arity.min..=most);
     Some(Trial { name, counts, needs, gives: info.gives.unwrap_or(ValueType::ANY), tests: info.tests })
 }
 
