@@ -1,15 +1,15 @@
 //! The rights that a program needs: calls of functions that reach the outside, with the objects that these
-//! calls name by constants.
+//! calls name by constants, and the options of forms that open sessions of Zenoh.
 //!
 //! Each call in the text counts, whether or not it is ever made. A function that is passed as a value, or
-//! whose object is computed, is listed as not known. Not here: rights of modules for robots, and of code that
-//! is made at run time.
+//! whose object is computed, is listed as not known. Not here: rights of other modules for robots, and of code
+//! that is made at run time.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use esl_bytecode::compile::MODULE_SOURCES;
-use esl_bytecode::datum::DatumKind;
+use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::{Callee, Core, NodeId, NodeKind};
 use esl_compiler::diagnostic::Sources;
@@ -64,7 +64,41 @@ const ROWS: &[RightsRow] = &[
 ];
 
 /// Packages of modules whose rights are not known.
-const OTHERS: [&str; 5] = ["ROS", "ZENOH", "MAVLINK", "MCAP", "FLEET"];
+const OTHERS: [&str; 3] = ["ROS", "MAVLINK", "MCAP"];
+
+/// A function that opens a session of Zenoh, whose options say where.
+struct SessionRow {
+    package: &'static str,
+    name: &'static str,
+    /// The form of which it is a part.
+    form: &'static str,
+    /// Position of the first option.
+    options: usize,
+    /// Whether the command says where if no option does.
+    has_defaults: bool,
+}
+
+const SESSIONS: [SessionRow; 2] = [
+    SessionRow {
+        package: "ZENOH",
+        name: "CALL-WITH-SESSION",
+        form: "zenoh:with-session",
+        options: 1,
+        has_defaults: false,
+    },
+    SessionRow {
+        package: "FLEET",
+        name: "CALL-AS-AGENT",
+        form: "fleet:join",
+        options: 2,
+        has_defaults: true,
+    },
+];
+
+/// Address at which sessions of Zenoh find each other.
+const SCOUTING: &str = "224.0.0.224:7446";
+/// Name of a fleet that a program does not name.
+const FLEET: &str = "esl";
 
 /// The rights that a program needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -142,6 +176,11 @@ fn add_call(
         _ = needed.unknown.insert(line);
         return;
     }
+    let session = SESSIONS.iter().find(|row| symbol.name() == row.name && symbol.is_in(row.package));
+    if let Some(row) = session {
+        add_session(core, row, arguments, place, needed);
+        return;
+    }
     let row = ROWS.iter().find(|(package, name, ..)| symbol.name() == *name && symbol.is_in(package));
     let Some((package, name, rights, object)) = row else { return };
     let text = |position: usize| {
@@ -180,6 +219,128 @@ fn add_call(
     }
 }
 
+/// Adds the rights of a call that opens a session of Zenoh.
+fn add_session(
+    core: &Core,
+    row: &SessionRow,
+    arguments: Option<&Vec<NodeId>>,
+    place: &dyn Fn() -> String,
+    needed: &mut NeededRights,
+) {
+    let options = arguments.map(|arguments| arguments.get(row.options..).unwrap_or_default());
+    let option = |name: &str| {
+        let (pairs, _) = options.unwrap_or_default().as_chunks::<2>();
+        pairs
+            .iter()
+            .find(|[key, _]| keyword(core, *key).is_some_and(|key| key.name() == name))
+            .map(|pair| pair[1])
+    };
+    let mut unknown = |right: &str| {
+        let line = format!("--allow-{right}, for {} at {}", row.form, place());
+        _ = needed.unknown.insert(line);
+    };
+    if options.is_none() {
+        unknown("net");
+        return;
+    }
+    let mut grant = |right: &str, object: &str| {
+        if !(matches!(right, "read" | "write") && is_below_here(object)) {
+            _ = needed.flags.insert(format!("--allow-{right}={object}"));
+        }
+    };
+    for side in ["CONNECT", "LISTEN"] {
+        let Some(node) = option(side) else { continue };
+        let Some(endpoints) = constant_texts(core, node) else {
+            unknown("net");
+            continue;
+        };
+        for endpoint in endpoints {
+            match endpoint.split_once('/') {
+                Some(("unixsock-stream", path)) => {
+                    grant("read", path);
+                    grant("write", path);
+                }
+                Some((_, address)) => {
+                    let end = address.find(['?', '#']).unwrap_or(address.len());
+                    grant("net", &address[..end]);
+                }
+                None => {}
+            }
+        }
+    }
+    match option("CONFIG").map(|node| constant_text(core, node)) {
+        None => {}
+        // Its endpoints are not known.
+        Some(path) => {
+            path.iter().for_each(|path| grant("read", path));
+            unknown("net");
+        }
+    }
+    match option("SCOUTING") {
+        None => {}
+        Some(node) if is_nil(core, node) => {}
+        Some(node) => grant("net", constant_text(core, node).as_deref().unwrap_or(SCOUTING)),
+    }
+    if let Some(node) = option("LEASES") {
+        let urls = constant_texts(core, node);
+        match urls.and_then(|urls| urls.iter().map(|url| address_of(url)).collect::<Option<Vec<_>>>()) {
+            Some(addresses) => addresses.iter().for_each(|address| grant("net", address)),
+            None => unknown("net"),
+        }
+    }
+    let says_where =
+        ["CONNECT", "LISTEN", "CONFIG", "SCOUTING"].into_iter().any(|name| option(name).is_some());
+    if row.has_defaults && !says_where {
+        match option("FLEET").map(|node| constant_name(core, node)) {
+            None => grant("fleet", FLEET),
+            Some(Some(fleet)) => grant("fleet", &fleet),
+            Some(None) => unknown("fleet"),
+        }
+    }
+}
+
+/// Returns whether a node is the constant `NIL`.
+fn is_nil(core: &Core, node: NodeId) -> bool {
+    matches!(&core.nodes[node.index()].kind, NodeKind::Constant(datum) if datum.is_nil())
+}
+
+/// Returns the keyword that a node is.
+fn keyword(core: &Core, node: NodeId) -> Option<Symbol> {
+    match &core.nodes[node.index()].kind {
+        NodeKind::Constant(datum) => datum.as_symbol().filter(|symbol| symbol.is_keyword()).cloned(),
+        _ => None,
+    }
+}
+
+/// Returns the name that a constant is, a string or a symbol, in lower case.
+fn constant_name(core: &Core, node: NodeId) -> Option<String> {
+    let text = constant_text(core, node).or_else(|| match &core.nodes[node.index()].kind {
+        NodeKind::Constant(datum) => datum.as_symbol().map(|symbol| symbol.name().to_string()),
+        _ => None,
+    });
+    text.map(|text| text.to_lowercase())
+}
+
+/// Returns the strings that a node names: one, a quoted list of some, or a call of `list`.
+fn constant_texts(core: &Core, node: NodeId) -> Option<Vec<String>> {
+    if let Some(text) = constant_text(core, node) {
+        return Some(vec![text]);
+    }
+    match &core.nodes[node.index()].kind {
+        NodeKind::Constant(datum) => {
+            let text = |item: &Datum| match item.kind() {
+                DatumKind::String(text) => Some(text.to_string()),
+                _ => None,
+            };
+            datum.elements().map(|item| text(&item)).collect()
+        }
+        NodeKind::Call(callee, items) if symbol_of(callee)?.is_cl("LIST") => {
+            items.iter().map(|item| constant_text(core, *item)).collect()
+        }
+        _ => None,
+    }
+}
+
 /// Returns a constant as a text: a string, or the digits of an integer.
 fn constant_text(core: &Core, node: NodeId) -> Option<String> {
     match &core.nodes[node.index()].kind {
@@ -211,10 +372,7 @@ fn program_of(core: &Core, node: NodeId) -> Option<String> {
 /// Returns the rights for a call of `open`.
 fn directions(core: &Core, arguments: Option<&Vec<NodeId>>) -> Vec<&'static str> {
     let Some(arguments) = arguments else { return vec!["read", "write"] };
-    let keyword = |node: &NodeId| match &core.nodes[node.index()].kind {
-        NodeKind::Constant(datum) => datum.as_symbol().filter(|symbol| symbol.is_keyword()).cloned(),
-        _ => None,
-    };
+    let keyword = |node: &NodeId| keyword(core, *node);
     let is_direction = |node: &NodeId| keyword(node).is_some_and(|key| key.name() == "DIRECTION");
     let Some(position) = arguments.iter().position(is_direction) else { return vec!["read"] };
     let direction = arguments.get(position + 1).and_then(keyword);

@@ -211,7 +211,7 @@ pub unsafe extern "C" fn esl_config_set_output(
 }
 
 /// Grants a right, as the options `--allow-…` of the commands do: "net=127.0.0.1:1883" grants access to that
-/// address, "read" to all files. The rights are read, write, net, run, env and serial.
+/// address, "read" to all files. The rights are read, write, net, run, env, serial and fleet.
 ///
 /// # Safety
 /// `config` is settings; `right` is a text with a null character at its end; `failure` is a place that can be

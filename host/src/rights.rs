@@ -30,12 +30,15 @@ pub enum Right {
     /// Reading modules that the program requires; the object is a path. It is not a right of its own: it
     /// comes with the folders of modules, or with [`Right::Read`].
     Module,
+    /// Being an agent of a fleet, by the connections that the command was given; the object is the name of
+    /// the fleet.
+    Fleet,
 }
 
 impl Right {
     /// The rights that can be granted.
-    pub const ALL: [Right; 6] =
-        [Right::Read, Right::Write, Right::Net, Right::Run, Right::Env, Right::Serial];
+    pub const ALL: [Right; 7] =
+        [Right::Read, Right::Write, Right::Net, Right::Run, Right::Env, Right::Serial, Right::Fleet];
 
     /// Returns its name, as in a flag: `read`.
     pub fn name(self) -> &'static str {
@@ -46,6 +49,7 @@ impl Right {
             Right::Run => "run",
             Right::Env => "env",
             Right::Serial => "serial",
+            Right::Fleet => "fleet",
         }
     }
 
@@ -147,6 +151,7 @@ impl Rights {
                 grants.any(|grant| grant.contains('/') && follow(grant) == path)
             }
             Right::Run | Right::Env => grants.any(|grant| grant == object),
+            Right::Fleet => grants.any(|grant| grant.eq_ignore_ascii_case(object)),
             Right::Read | Right::Write | Right::Serial | Right::Module => {
                 grants.any(|grant| Path::new(object).starts_with(follow(grant)))
             }

@@ -16,6 +16,8 @@ mod zenoh;
 
 use esl_host::{HostModule, HostRows};
 
+pub use self::zenoh::defaults::{AgentDefaults, AgentDefaultsError};
+
 /// The modules. Those whose names begin with `ros-` are parts of `ros`, which requires them; so are those of
 /// `mavlink-` and `fleet-`.
 pub const MODULES: &[HostModule] = &[

@@ -7,6 +7,7 @@
 
 mod command;
 pub mod explore;
+pub mod fleet;
 pub mod mcap;
 pub mod operate;
 pub mod profile;

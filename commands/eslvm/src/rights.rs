@@ -32,6 +32,9 @@ pub struct RightsOptions {
     /// Permit access to these serial lines, or all
     #[arg(long, value_name = "PATH,…", num_args = 0..=1, require_equals = true, default_missing_value = ALL, help_heading = "Rights")]
     allow_serial: Vec<String>,
+    /// Permit being an agent of these fleets, by the connections of --zenoh, or of all
+    #[arg(long, value_name = "FLEET,…", num_args = 0..=1, require_equals = true, default_missing_value = ALL, help_heading = "Rights")]
+    allow_fleet: Vec<String>,
     /// Permit everything that the system permits its user
     #[arg(long, help_heading = "Rights")]
     allow_all: bool,
@@ -54,6 +57,7 @@ impl RightsOptions {
             (Right::Run, &self.allow_run),
             (Right::Env, &self.allow_env),
             (Right::Serial, &self.allow_serial),
+            (Right::Fleet, &self.allow_fleet),
         ];
         for (right, values) in options {
             for value in values {
@@ -118,7 +122,7 @@ fn parse(text: &str) -> Result<Rights, (usize, String)> {
             None => (grants, None),
         };
         let Some(right) = Right::of_name(name) else {
-            return Err(wrong("expected read, write, net, run, env, serial or all after `--allow-`"));
+            return Err(wrong("expected read, write, net, run, env, serial, fleet or all after `--allow-`"));
         };
         rights = grant(rights, right, objects).map_err(wrong)?;
     }

@@ -17,6 +17,7 @@ use esl_world::{ready_soon, spawned};
 use zenoh::Wait;
 
 mod config;
+pub(crate) mod defaults;
 pub(crate) mod delivery;
 pub(crate) mod entity;
 pub(crate) mod payload;
@@ -24,7 +25,7 @@ pub(crate) mod query;
 pub(crate) mod runtime;
 pub(crate) mod session;
 
-use config::{SessionConfig, Side, parts_of_endpoint};
+use config::{ConfiguredPlace, SessionConfig, Side, parts_of_endpoint};
 use entity::DeclaredEntity;
 use payload::PayloadForm;
 use query::{PendingQuery, QueryRequest, datum_of_reply, get};
@@ -47,6 +48,23 @@ impl FromArgument for Side {
     }
 }
 
+/// Returns a place of a configuration as the module takes it.
+fn datum_of_place(place: &ConfiguredPlace) -> Result<Datum, HostFailure> {
+    let texts = |kind, texts: &[&str]| {
+        let texts = texts.iter().map(|&text| text.into_datum());
+        std::iter::once(Keyword(kind).into_datum()).chain(texts).collect::<Vec<_>>().into_datum()
+    };
+    Ok(match place {
+        ConfiguredPlace::Scouting(address) => texts("SCOUT", &[address]),
+        ConfiguredPlace::File(setting, path) => texts("FILE", &[setting, path]),
+        ConfiguredPlace::Endpoint(side, endpoint) => {
+            let (protocol, address, rest) = parts_of_endpoint(endpoint)?;
+            let kind = if *side == Side::Connect { "CONNECT" } else { "LISTEN" };
+            texts(kind, &[protocol, address, rest])
+        }
+    })
+}
+
 /// Returns the functions of `:zenoh`.
 pub(crate) fn rows(inbox: &Inbox) -> HostRows {
     let mut rows = HostRows::new(inbox);
@@ -67,29 +85,49 @@ fn add_sessions(rows: &mut HostRows) {
     rows.at_once(
         "%ZENOH-CONFIGURE",
         ["session", "text"],
-        "Takes the configuration that TEXT describes, in JSON5; returns the endpoints in it, which are not part of it \
-         yet: lists of :CONNECT or :LISTEN, protocol, address and rest, or of :SCOUT and an address.",
+        "Takes the configuration that TEXT describes, in JSON5; returns the places in it, which are not part of it \
+         yet: lists of :CONNECT or :LISTEN, protocol, address and rest; of :SCOUT and an address; or of :FILE, a \
+         setting and a path.",
         |session: HostHandle<ZenohSession>, text: String| {
-            let (config, endpoints) = SessionConfig::of_text(&text)?;
+            let (config, places) = SessionConfig::of_text(&text)?;
             session.configure(|old| {
                 *old = config;
                 Ok(())
             })?;
-            let endpoints: Result<Vec<Datum>, HostFailure> = endpoints
-                .iter()
-                .map(|(side, endpoint)| match side {
-                    None => Ok(vec![Keyword("SCOUT").into_datum(), endpoint.as_str().into_datum()].into_datum()),
-                    Some(side) => {
-                        let side = Keyword(if *side == Side::Connect { "CONNECT" } else { "LISTEN" });
-                        let (protocol, address, rest) = parts_of_endpoint(endpoint)?;
-                        let parts = [protocol, address, rest].map(IntoDatum::into_datum);
-                        Ok(std::iter::once(side.into_datum()).chain(parts).collect::<Vec<_>>().into_datum())
-                    }
-                })
-                .collect();
-            endpoints
+            places.iter().map(datum_of_place).collect::<Result<Vec<Datum>, HostFailure>>()
         },
     )
+    .lasts();
+    rows.at_once(
+        "%ZENOH-FILE",
+        ["session", "setting", "path"],
+        "Adds a file of keys or certificates.",
+        |session: HostHandle<ZenohSession>, setting: String, path: String| {
+            session.configure(|config| config.add_place(ConfiguredPlace::File(setting, path)))
+        },
+    )
+    .needs(Right::Read, "path")
+    .lasts();
+    rows.at_once(
+        "%ZENOH-DEFAULTS",
+        [],
+        "Returns the name of the agent that the command names, or NIL, and whether it has a configuration.",
+        || Ok(defaults::as_data()),
+    )
+    .everywhere();
+    rows.at_once(
+        "%ZENOH-BY-COMMAND",
+        ["session", "fleet"],
+        "Takes the configuration of the command, for an agent of FLEET.",
+        |session: HostHandle<ZenohSession>, _fleet: String| {
+            let config = defaults::session()?;
+            session.configure(|old| {
+                *old = config;
+                Ok(())
+            })
+        },
+    )
+    .needs(Right::Fleet, "fleet")
     .lasts();
     rows.at_once(
         "%ZENOH-PARTS",
@@ -106,14 +144,13 @@ fn add_sessions(rows: &mut HostRows) {
         ["session", "side", "protocol", "address", "rest"],
         "Adds an endpoint of the network.",
         |session: HostHandle<ZenohSession>, side: Side, protocol: String, address: String, rest: String| {
-            if !matches!(protocol.as_str(), "tcp" | "udp") || rest.contains('/') {
-                let reason = format!("unknown protocol `{protocol}`: expected tcp, udp or unixsock-stream");
-                return Err(zenoh_failure(reason));
+            if protocol == "unixsock-stream" || rest.contains('/') {
+                return Err(zenoh_failure(format!(
+                    "`{protocol}/{address}{rest}` is not an endpoint of the network"
+                )));
             }
-            session.configure(|config| {
-                config.add_endpoint(side, format!("{protocol}/{address}{rest}"));
-                Ok(())
-            })
+            let place = ConfiguredPlace::Endpoint(side, format!("{protocol}/{address}{rest}"));
+            session.configure(|config| config.add_place(place))
         },
     )
     .needs(Right::Net, "address")
@@ -123,10 +160,8 @@ fn add_sessions(rows: &mut HostRows) {
         ["session", "side", "path"],
         "Adds an endpoint that is a Unix socket.",
         |session: HostHandle<ZenohSession>, side: Side, path: String| {
-            session.configure(|config| {
-                config.add_endpoint(side, format!("unixsock-stream/{path}"));
-                Ok(())
-            })
+            let place = ConfiguredPlace::Endpoint(side, format!("unixsock-stream/{path}"));
+            session.configure(|config| config.add_place(place))
         },
     )
     .needs(Right::Read, "path")
@@ -137,7 +172,7 @@ fn add_sessions(rows: &mut HostRows) {
         ["session", "address"],
         "Finds peers by multicast at ADDRESS.",
         |session: HostHandle<ZenohSession>, address: String| {
-            session.configure(|config| config.scout(&address))
+            session.configure(|config| config.add_place(ConfiguredPlace::Scouting(address)))
         },
     )
     .needs(Right::Net, "address")

@@ -251,7 +251,12 @@ fn opening_failure(reason: &str, peers: &str) -> HostFailure {
     if reason.contains("nable to connect") {
         let text = format!(
             "no session of Zenoh answers at {peers}: start one there, such as the router of rmw_zenoh, or wait \
-             for it by :timeout"
+             for it by :timeout{}",
+            if peers.contains("tls/") {
+                "; by TLS, each side has to accept the certificate of the other"
+            } else {
+                ""
+            }
         );
         return HostFailure::new("CONNECTION-REFUSED", text);
     }

@@ -86,7 +86,7 @@ fn expect_right(vm: &mut Vm, v: Value) -> Result<Right, Exit> {
     let right = if is_keyword { Right::of_name(&designated_text(vm, v)?) } else { None };
     match right {
         Some(right) => Ok(right),
-        None => vm.exchange.not_written(v, "(MEMBER :READ :WRITE :NET :RUN :ENV :SERIAL)"),
+        None => vm.exchange.not_written(v, "(MEMBER :READ :WRITE :NET :RUN :ENV :SERIAL :FLEET)"),
     }
 }
 

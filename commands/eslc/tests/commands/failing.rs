@@ -87,6 +87,27 @@ fn rights_are_listed_with_those_that_are_not_known() {
 }
 
 #[test]
+fn rights_of_agents_are_those_to_their_fleet_or_its_endpoints() {
+    let text = "(require :fleet)
+        (defun by-command () (fleet:join () (sleep 1)))
+        (defun of-fleet () (fleet:join ('a :fleet \"Plant\" :leases \"http://10.0.0.2:2379\") (sleep 1)))
+        (defun by-itself (port)
+          (fleet:join ('b :connect '(\"tcp/base:7447\" \"tls/spare:7448#x=y\") :listen \"unixsock-stream//run/z\")
+            (fleet:agents))
+          (fleet:join ('c :connect (format nil \"tcp/base:~d\" port)) (fleet:agents))
+          (fleet:join ('d :config \"/etc/zenoh.json5\") (fleet:agents)))
+        (defun scout () (zenoh:with-session (s :scouting t :listen \"udp/0.0.0.0:7447\") s))";
+    let folder = Folder::with("failing-fleet-rights", &[("rover.esl", text)]);
+    let (status, output, errors) = run(&folder, &["rights", "rover.esl"]);
+    let expected = "--allow-fleet=esl\n--allow-fleet=plant\n--allow-net=0.0.0.0:7447\n--allow-net=10.0.0.2:2379\n\
+                    --allow-net=224.0.0.224:7446\n--allow-net=base:7447\n--allow-net=spare:7448\n\
+                    --allow-read=/etc/zenoh.json5\n--allow-read=/run/z\n--allow-write=/run/z\n\
+                    # not known: --allow-net, for fleet:join at rover.esl:7:11\n\
+                    # not known: --allow-net, for fleet:join at rover.esl:8:11\n";
+    assert_eq!((status, output.as_str()), (Some(0), expected), "{errors}");
+}
+
+#[test]
 fn severities_and_notes_are_carried_over() {
     let notes = "item,failure mode,severity,notes\ndrive,:lost,1,look at it\ndrive,:gone,2,old\n";
     let folder = Folder::with("failing-notes", &[("mission.esl", MISSION), ("notes.csv", notes)]);

@@ -83,6 +83,7 @@ pub fn main() -> u8 {
             record,
             mut trace,
             full,
+            agent,
             files,
             operate,
             durable,
@@ -105,7 +106,7 @@ pub fn main() -> u8 {
                 return command::USAGE;
             }
             let path = ModulePath::new([file.as_path()], &modules.library);
-            let rights = options.rights.rights();
+            let rights = agent.install().and_then(|()| options.rights.rights());
             rights.and_then(|rights| {
                 let host =
                     RealHost::new(arguments.clone()).with_rights(path.with_rights(rights)).with_speed(speed);

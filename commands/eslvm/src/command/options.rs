@@ -15,6 +15,7 @@ use super::durable::StateOptions;
 use super::host::{AgentsOptions, HostOptions};
 use super::injecting::InjectArguments;
 use super::state::LookOptions;
+use crate::fleet::AgentOptions;
 use crate::mcap::{McapAction, RunFileOptions};
 use crate::operate::OperateOptions;
 use crate::profile::ProfileUnit;
@@ -113,6 +114,8 @@ pub(crate) enum EslvmAction {
         /// Show all calls of the library in reports of failures, which are folded otherwise
         #[arg(long)]
         full: bool,
+        #[command(flatten)]
+        agent: AgentOptions,
         #[command(flatten)]
         files: RunFileOptions,
         #[command(flatten)]

@@ -30,6 +30,8 @@ mod exploring_endless;
 mod exploring_randomly;
 #[cfg(unix)]
 mod fleet;
+#[cfg(unix)]
+mod fleet_command;
 mod http;
 mod http_client;
 mod http_peers;
