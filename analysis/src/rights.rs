@@ -2,8 +2,8 @@
 //! calls name by constants, and the options of forms that open sessions of Zenoh.
 //!
 //! Each call in the text counts, whether or not it is ever made. A function that is passed as a value, or
-//! whose object is computed, is listed as not known. Not here: rights of other modules for robots, and of code
-//! that is made at run time.
+//! whose object is computed, is listed as not known. Not here: rights of other modules for robots, and of
+//! code that is made at run time.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -332,7 +332,7 @@ fn constant_texts(core: &Core, node: NodeId) -> Option<Vec<String>> {
                 DatumKind::String(text) => Some(text.to_string()),
                 _ => None,
             };
-            datum.elements().map(|item| text(&item)).collect()
+            datum.elements().map(text).collect()
         }
         NodeKind::Call(callee, items) if symbol_of(callee)?.is_cl("LIST") => {
             items.iter().map(|item| constant_text(core, *item)).collect()

@@ -63,8 +63,8 @@ const TLS_FILES: [&str; 5] = [
 ];
 /// Settings without effect here, on which a user of Zenoh could rely, and what to use in their place.
 const WITHOUT_EFFECT: [(&str, &str); 3] = [
-    ("transport/auth/usrpwd", "use TLS, whose certificates say who is there"),
-    ("transport/auth/pubkey", "use TLS, whose certificates say who is there"),
+    ("transport/auth/usrpwd", "use TLS with certificates"),
+    ("transport/auth/pubkey", "use TLS with certificates"),
     ("plugins", "run `zenohd` for them, and connect to it"),
 ];
 
@@ -179,8 +179,8 @@ impl SessionConfig {
         }
     }
 
-    /// Sets the role of the session. Without one it has that of its file; if that says none, it is a client if
-    /// it only connects, and a peer otherwise.
+    /// Sets the role of the session. Without one it has that of its file; if that says none, it is a client
+    /// if it only connects, and a peer otherwise.
     pub(crate) fn set_mode(&mut self, mode: Option<&str>) -> Result<(), HostFailure> {
         let only_connects = !self.connect.is_empty() && self.listen.is_empty() && !self.scouts;
         let mode = match mode {
@@ -260,12 +260,14 @@ fn quoted(text: &str) -> String {
     Value::from(text).to_string()
 }
 
-/// Returns the endpoints of a session with this role in a setting: a list of endpoints and lists of them,
+/// Returns the endpoints of a session with this role in a setting: a list of endpoints and of groups of them,
 /// which may be given for each role.
 fn endpoints_in(setting: &Value, mode: &str) -> Vec<String> {
     let list = if setting.is_object() { &setting[mode] } else { setting };
     let texts = list.as_array().into_iter().flatten().flat_map(|item| match item {
-        Value::Array(alternatives) => alternatives.as_slice(),
+        Value::Object(group) => {
+            group.get("locators").and_then(Value::as_array).map_or(&[][..], Vec::as_slice)
+        }
         one => std::slice::from_ref(one),
     });
     texts.filter_map(|text| text.as_str().map(str::to_owned)).collect()
@@ -310,7 +312,8 @@ mod tests {
 
     #[test]
     fn places_of_a_file_are_handed_out_and_taken_out() {
-        let source = r#"{ mode: "peer", connect: { endpoints: ["tcp/a:1", ["udp/b:2", "tls/d:4"]] },
+        let source = r#"{ mode: "peer", connect: { endpoints: ["tcp/a:1", { strategy: "allOf",
+                                                              locators: ["udp/b:2", "tls/d:4"] }] },
                           listen: { endpoints: { peer: ["tcp/c:3"], router: ["tcp/e:5"] } },
                           transport: { link: { tls: { root_ca_certificate: "/ca.pem" } } },
                           scouting: { multicast: { enabled: true } } }"#;

@@ -1,4 +1,4 @@
-//! What the command says about the agent that its program is: the options `--agent` and `--zenoh`.
+//! The name of an agent and its connections, as the command gives them: its options `--agent` and `--zenoh`.
 //!
 //! They belong to the process, since a command runs one program. The configuration stays here: a program with
 //! the right [`esl_host::Right::Fleet`] opens a session with it, and cannot read it.

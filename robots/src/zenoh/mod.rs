@@ -144,7 +144,9 @@ fn add_sessions(rows: &mut HostRows) {
         ["session", "side", "protocol", "address", "rest"],
         "Adds an endpoint of the network.",
         |session: HostHandle<ZenohSession>, side: Side, protocol: String, address: String, rest: String| {
-            if protocol == "unixsock-stream" || rest.contains('/') {
+            // Settings of an endpoint may name files, for which no right was asked.
+            if protocol == "unixsock-stream" || rest.contains('/') || (protocol == "tls" && !rest.is_empty())
+            {
                 return Err(zenoh_failure(format!(
                     "`{protocol}/{address}{rest}` is not an endpoint of the network"
                 )));

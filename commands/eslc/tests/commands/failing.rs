@@ -92,7 +92,7 @@ fn rights_of_agents_are_those_to_their_fleet_or_its_endpoints() {
         (defun by-command () (fleet:join () (sleep 1)))
         (defun of-fleet () (fleet:join ('a :fleet \"Plant\" :leases \"http://10.0.0.2:2379\") (sleep 1)))
         (defun by-itself (port)
-          (fleet:join ('b :connect '(\"tcp/base:7447\" \"tls/spare:7448#x=y\") :listen \"unixsock-stream//run/z\")
+          (fleet:join ('b :connect '(\"tcp/base:7447\" \"tls/spare:7448\") :listen \"unixsock-stream//run/z\")
             (fleet:agents))
           (fleet:join ('c :connect (format nil \"tcp/base:~d\" port)) (fleet:agents))
           (fleet:join ('d :config \"/etc/zenoh.json5\") (fleet:agents)))

@@ -100,8 +100,8 @@ fn tls(endpoints: &str, certificate: &str) -> String {
     )
 }
 
-/// Makes an authority and its certificates of a server and of an agent `rover-1`, and the certificate of `other`,
-/// which it has not signed. Returns false, after saying so, if there is nothing to make them with.
+/// Makes an authority and its certificates of a server and of an agent `rover-1`, and the certificate of
+/// `other`, which it has not signed. Returns false, after saying so, if there is nothing to make them with.
 fn make_all_certificates(folder: &Folder) -> bool {
     let openssl = |arguments: &str| {
         let arguments = arguments.split_whitespace();
