@@ -1826,8 +1826,9 @@ macro_rules! for_each_builtin {
             SleepUntil = event::sleep_until, internal "%SLEEP-UNTIL" ("deadline") shares own;
             /// Has a function called, in a task of its own, for each signal of the process of this number.
             OnSignal = event::on_signal, internal "%ON-SIGNAL" ("number function") shares own;
-            /// A number below `count`, picked by the seed of the run, or by the explorer of its schedules.
-            Choose = event::choose, internal "%CHOOSE" ("count") shares own;
+            /// A number below `count`, picked by the seed of the run, or by the explorer of its schedules. A
+            /// `way` of 1 or 2 asks whether a restart interrupts a call, before its effect or behind it.
+            Choose = event::choose, internal "%CHOOSE" ("count &optional way") shares own;
             /// Lets other tasks have their turns.
             PassTurn = event::pass_turn, internal "%PASS-TURN" ("") shares own;
 

@@ -65,7 +65,7 @@ use query::QueryRoom;
 pub use query::{Progress, QueryError};
 use relation::Relation;
 use rule::{Rule, Rules};
-pub use survey::{Describe, RelationFigures};
+pub use survey::{Describe, RelationFigures, TermContents};
 pub use term::Term;
 use term::Terms;
 

@@ -12,6 +12,25 @@ const RELATIONS: usize = 2000;
 /// A function that returns the text of an object, which terms are shown with.
 pub type Describe = fn(&Heap, Value) -> String;
 
+/// The contents of a term, as far as data stand for them.
+#[derive(Clone, Copy, Debug)]
+pub enum TermContents<'a> {
+    /// A value of one word: a small number, a character or a symbol.
+    Word(Value),
+    /// A pair.
+    Pair(Term, Term),
+    /// A string.
+    Text(&'a [u32]),
+    /// A large integer: whether it is negative, and its limbs, the lowest first.
+    Big(bool, &'a [u64]),
+    /// A ratio.
+    Ratio(Term, Term),
+    /// A double float.
+    Float(f64),
+    /// Another object of the heap, or one that is compared by its slots.
+    Object,
+}
+
 /// A relation, as it is seen from outside.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RelationFigures {
@@ -46,6 +65,18 @@ impl Database {
             .collect();
         rows.sort_by(|a, b| (&a.name, a.width).cmp(&(&b.name, b.width)));
         rows
+    }
+
+    /// Calls `visit` with the name and the arguments of each fact.
+    pub fn each_fact(&self, visit: &mut dyn FnMut(Term, &[Term])) {
+        for relation in &self.relations {
+            relation.live_rows().for_each(|row| visit(relation.functor, relation.row(row)));
+        }
+    }
+
+    /// Returns the contents of a term.
+    pub fn contents(&self, term: Term) -> TermContents<'_> {
+        self.terms.contents(term)
     }
 
     /// Returns the texts of facts, those of relations with this name, or of all if it is empty: at most so

@@ -61,6 +61,7 @@ impl DurableRun {
         program::set_module_folders(&mut machine, &beginning.folders).map_err(DurableError::Machine)?;
         program::set_program_file(&mut machine, &beginning.program_file).map_err(DurableError::Machine)?;
         program::set_traces(&mut machine, &beginning.traces).map_err(DurableError::Machine)?;
+        self.prepare(&mut machine)?;
         compare_settings(beginning, &esl_replay::beginning_of(beginning, &machine))?;
         self.take_up(found)?;
         let main = match self.restore(&mut machine)? {

@@ -36,6 +36,7 @@ impl ChangedKind {
             | "to-achieve"
             | "define-compiler-macro" => ChangedKind::Function,
             "defvar"
+            | "defdurable"
             | "defparameter"
             | "defconstant"
             | "define-fluent"

@@ -93,6 +93,7 @@ impl DurableEngine {
         // A copy of the run takes the same steps.
         program::set_module_folders(&mut machine, &folders).map_err(DurableError::Machine)?;
         program::set_program_file(&mut machine, &program_file).map_err(DurableError::Machine)?;
+        run.prepare(&mut machine)?;
         let setup = RunSetup { config: settings.config, folders, program_file, ..RunSetup::default() };
         run.begin(&program, &setup, &machine)?;
         machine.set_tier(Tier::Auto);

@@ -32,6 +32,10 @@ pub enum DurableError {
     NoBeginning,
     /// Its machine cannot be made, or its program not be begun.
     Machine(esl::Error),
+    /// There are no facts from which the run of another version of the machine could begin anew.
+    NoFacts,
+    /// The facts from which the run is to begin anew cannot be read.
+    Facts(esl::Error),
     /// The program contains an object that no file can hold.
     Program(WriteError),
     /// The folder has the run of another program: the changes.
@@ -80,11 +84,20 @@ impl fmt::Display for DurableError {
                 kept.as_secs_f64()
             ),
             DurableError::Journal(RecordedError::OtherMachine) => f.write_str(
-                "the run was begun by another version of the machine or its library; go on with that version, or \
-                 begin a new run in another folder",
+                "the run was begun by another version of the machine or its library; go on with that version, \
+                 type `--from-facts` to begin anew with its facts, or begin a new run in another folder",
             ),
+            DurableError::NoFacts => f.write_str(
+                "the run was begun by another version of the machine, and its folder has no facts: it was neither \
+                 paused nor stored by a snapshot before; go on with that version, or begin a new run in another folder",
+            ),
+            DurableError::Facts(error) => write!(f, "the facts of the earlier run cannot be made: {error}"),
             DurableError::Journal(RecordedError::Format(version)) => {
-                write!(f, "the journal has version {version} of the format, which this machine cannot read")
+                write!(
+                    f,
+                    "the journal has version {version} of the format, which this machine cannot read; type \
+                     `--from-facts` to begin anew with the facts of the run"
+                )
             }
             DurableError::Journal(error) => write!(f, "the journal cannot be read: {error}"),
             DurableError::NoBeginning => f.write_str("the folder has no run that has begun"),

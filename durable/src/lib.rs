@@ -41,6 +41,7 @@ mod control;
 mod disk;
 mod engine;
 mod error;
+mod facts;
 mod file_effect;
 mod folder;
 mod fork;
@@ -76,6 +77,7 @@ pub use control::{DurableControl, Resumed};
 pub use disk::{Disk, RealDisk, SnapshotWriting};
 pub use engine::{DurableEnding, DurableEngine, DurableSettings};
 pub use error::DurableError;
+pub use facts::KeptFacts;
 pub use folder::RunFolder;
 pub use fork::{RunFork, fork};
 pub use host::DurableHost;
@@ -126,6 +128,9 @@ pub struct DurableOptions {
     /// Time of day in nanoseconds since 1970 at which the host of the run has begun, if it has one: from then
     /// on the clock of a run that sleeps goes on, also where a downtime does not count.
     pub hosted: Option<i64>,
+    /// Whether the run of another version of the machine begins anew, with its facts and the variables of
+    /// `defdurable`.
+    pub from_facts: bool,
 }
 
 /// A durable run in this process.
@@ -140,6 +145,8 @@ pub struct DurableRun {
     /// Warnings about the files.
     warnings: Vec<String>,
     found: Option<FoundRun>,
+    /// The facts from which it begins anew.
+    kept: Option<KeptFacts>,
 }
 
 /// A run that is to go on.
@@ -167,11 +174,12 @@ impl DurableRun {
     /// [`DurableError`].
     pub fn open(path: &Path, options: DurableOptions) -> Result<DurableRun, DurableError> {
         let folder = RunFolder::open(path)?;
-        let found = generations::find(folder.path())?;
+        let (found, kept) = facts::find(folder.path(), options.from_facts)?;
         let last = found.as_ref().map_or(0, |found| found.last);
         let disk = with_kill(RealDisk::new(generations::journal_file(folder.path(), last)));
         let mut run = DurableRun::with(disk, found, options)?;
-        run.folder = Some(folder);
+        run.taker.keep_facts_in(folder.path());
+        (run.folder, run.kept) = (Some(folder), kept);
         Ok(run)
     }
 
@@ -227,6 +235,7 @@ impl DurableRun {
                 range: fresh,
                 warnings,
                 found: None,
+                kept: None,
             });
         };
         let RunJournal { recorded, lives, upgrades, saved, length, time, generation: _, writer } = journal;
@@ -242,7 +251,8 @@ impl DurableRun {
         let snapshot = recorded.start.as_ref().and_then(|start| start.snapshot.as_ref());
         let range = snapshot.map(|snapshot| snapshot.range).or(fresh);
         let found = FoundRun { recorded, upgrades, resumption, torn, upgrade: None };
-        Ok(DurableRun { folder: None, log, control, taker, lasting, range, warnings, found: Some(found) })
+        let (folder, kept) = (None, None);
+        Ok(DurableRun { folder, log, control, taker, lasting, range, warnings, found: Some(found), kept })
     }
 
     /// Returns warnings about the files, such as that of a damaged snapshot.
@@ -349,7 +359,8 @@ impl DurableRun {
     /// # Errors
     /// [`DurableError`].
     pub fn begin(&self, program: &Program, setup: &RunSetup, machine: &Vm) -> Result<(), DurableError> {
-        let beginning = esl_replay::beginning(program, setup, machine).map_err(DurableError::Program)?;
+        let beginning = esl_replay::beginning(program, setup, machine);
+        let mut beginning = beginning.map_err(DurableError::Program)?;
         match &self.found {
             Some(found) => {
                 compare(&found.recorded.beginning, &beginning, program)?;
@@ -358,8 +369,10 @@ impl DurableRun {
             None => {
                 let (wall, chance) = (wall_clock(), chance());
                 let life = JournalLife { number: 1, wall, chance, ..JournalLife::default() };
+                beginning.kept = self.kept.as_ref().map(KeptFacts::for_beginning);
                 self.log.create(&beginning, life);
-                self.check()
+                self.check()?;
+                self.end_beginning()
             }
         }
     }
@@ -395,6 +408,7 @@ impl DurableRun {
             self.log.note_life(JournalLife { is_pause: true, wall, time, ..life });
             self.log.finish();
             self.taker.finish();
+            self.keep_facts(machine);
         }
         self.check()
     }
@@ -411,6 +425,7 @@ impl DurableRun {
         self.log.end(machine.check(), status);
         self.taker.finish();
         self.check()?;
+        self.forget_facts();
         self.note_rest(RunRest::Ended(status));
         Ok(())
     }

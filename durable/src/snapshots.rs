@@ -6,6 +6,7 @@
 //! Guarantees: at each moment the files in the folder are enough to go on. A snapshot that cannot be taken or
 //! written is left out: the journals cover it.
 
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,6 +17,7 @@ use esl_vm::vm::Vm;
 
 use super::control::DurableControl;
 use super::disk::SnapshotWriting;
+use super::facts;
 use super::lasting::LastingCalls;
 use super::log::JournalLog;
 
@@ -91,6 +93,8 @@ struct Taking {
     waited: u32,
     writing: Option<(u64, SnapshotWriting)>,
     figures: SnapshotFigures,
+    /// The folder in which the facts are kept as a text.
+    folder: Option<PathBuf>,
 }
 
 impl SnapshotTaker {
@@ -111,12 +115,18 @@ impl SnapshotTaker {
             waited: 0,
             writing: None,
             figures: SnapshotFigures::default(),
+            folder: None,
         })))
     }
 
     fn lock(&self) -> MutexGuard<'_, Taking> {
         // A snapshot is begun as a whole, so a panic elsewhere does not corrupt this.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Has the facts of the run written in this folder with each snapshot.
+    pub(crate) fn keep_facts_in(&self, folder: &Path) {
+        self.lock().folder = Some(folder.into());
     }
 
     /// Has a machine that is about to run take them.
@@ -211,6 +221,11 @@ impl Taking {
             self.not_before = Some(Instant::now() + SOON);
             return false;
         };
+        if let Some(Err(error)) =
+            self.folder.as_ref().map(|folder| facts::keep(folder, machine, false, false))
+        {
+            self.control.warn(&format!("the facts cannot be written as a text: {error}"));
+        }
         self.last = (Instant::now(), machine.ticks());
         self.figures.taken += 1;
         self.figures.longest = self.figures.longest.max(begun.elapsed());

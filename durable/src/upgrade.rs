@@ -279,6 +279,7 @@ impl DurableRun {
             range,
             warnings: Vec::new(),
             found: Some(found),
+            kept: None,
         }
     }
 

@@ -232,7 +232,8 @@ fn life(
     device: &Device,
 ) -> Result<(u8, String), DurableError> {
     let snapshots = SnapshotEvery::Never;
-    let options = DurableOptions { durability, downtime: Downtime::Stops, snapshots, hosted: None };
+    let options =
+        DurableOptions { durability, downtime: Downtime::Stops, snapshots, hosted: None, from_facts: false };
     let run = DurableRun::on(Box::new(disk), options)?;
     if let Some(status) = run.ended() {
         return Ok((status, String::new()));

@@ -99,7 +99,10 @@ impl Styles {
                 "defun defmacro deftype define-compiler-macro define-setf-expander",
                 body([Data, Parameters], Form),
             ),
-            ("defvar defparameter defconstant", Indentation::Body([Data, Form].into(), 2, Arc::new(Form))),
+            (
+                "defvar defdurable defparameter defconstant",
+                Indentation::Body([Data, Form].into(), 2, Arc::new(Form)),
+            ),
             ("defclass define-condition", body([Data, Data], each(header()))),
             ("with-recovery-procedures", body([each(clause())], Form)),
             ("task-net or-parallel try-all pursue try-in-order", sequence(sequence(Form))),

@@ -98,6 +98,7 @@ fn add(tree: &SyntaxTree, form: NodeId, operator: &str, package: &str, found: &m
         | "define-fluent"
         | "define-symbol-macro"
         | "define-input"
+        | "defdurable"
         | "define-resource" => DefinedAs::Variable,
         "defconstant" => DefinedAs::Constant,
         "defstruct" | "defclass" | "define-condition" | "deftype" => DefinedAs::Type,

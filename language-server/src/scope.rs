@@ -37,6 +37,7 @@ const DEFINING_NO_FUNCTION: &[&str] = &[
     "define-fluent",
     "define-hash-table-test",
     "define-input",
+    "defdurable",
     "define-resource",
     "define-rule",
     "define-symbol-macro",
@@ -165,7 +166,13 @@ fn is_description(tree: &SyntaxTree, list: NodeId) -> bool {
     let has_value = |operator: &str| {
         matches!(
             operator,
-            "defvar" | "defparameter" | "defconstant" | "deftest" | "define-fluent" | "define-rule"
+            "defvar"
+                | "defdurable"
+                | "defparameter"
+                | "defconstant"
+                | "deftest"
+                | "define-fluent"
+                | "define-rule"
         )
     };
     match place(list) {

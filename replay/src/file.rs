@@ -41,7 +41,7 @@ use super::snapshot::RunSnapshot;
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
 /// The version of the format that this library reads and writes.
-pub const FORMAT: u32 = 8;
+pub const FORMAT: u32 = 9;
 
 /// Length of what is before the content of a frame.
 pub(super) const FRAME: usize = 11;
@@ -94,6 +94,8 @@ pub struct Beginning {
     pub functions: Vec<GivenFunction>,
     /// Whether the machine has the functions of the library that serve operators.
     pub has_operators: bool,
+    /// The facts and variables with which it begins, as [`set_kept`](super::set_kept) takes them.
+    pub kept: Option<String>,
     /// Identity of the machine and its library.
     pub(super) identity: String,
 }
@@ -224,6 +226,7 @@ pub(super) fn beginning_bytes(beginning: &Beginning) -> Vec<u8> {
         });
     });
     out.byte(beginning.has_operators.into());
+    out.list(beginning.kept.as_slice(), |out, text| out.text(text));
     out.bytes(&beginning.program);
     frame(&mut bytes, kind::HEADER, &out.0);
     bytes
@@ -248,6 +251,8 @@ pub(super) fn read_beginning(content: &[u8]) -> Option<Beginning> {
         Some(GivenFunction { name, is_operation, needs })
     })?;
     let has_operators = from.flag()?;
+    let mut kept: Vec<String> = from.list(|from| Some(from.text()?.into()))?;
+    let kept = kept.pop();
     let program = from.bytes()?.to_vec();
     from.is_empty().then_some(Beginning {
         program,
@@ -258,6 +263,7 @@ pub(super) fn read_beginning(content: &[u8]) -> Option<Beginning> {
         schedule,
         functions,
         has_operators,
+        kept,
         identity,
     })
 }

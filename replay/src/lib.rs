@@ -30,6 +30,7 @@ mod debugger;
 mod file;
 mod generation;
 mod journal;
+mod kept;
 mod pack;
 mod pattern;
 mod recorder;
@@ -60,6 +61,7 @@ pub use journal::{
     JournalLife, JournalUpgrade, JournalWriter, RunJournal, journal_beginning, journal_end, journal_life,
     journal_saved,
 };
+pub use kept::set_kept;
 pub use pattern::{FactPattern, NotAPattern};
 pub use recorder::FileRecorder;
 pub use rerun::{Replayed, Rerun, RerunError, begin_recorded, prepare_recorded};
@@ -153,6 +155,7 @@ pub fn beginning(program: &Program, setup: &RunSetup, machine: &Vm) -> Result<Be
         schedule: setup.schedule.as_ref().map(Schedule::to_string),
         functions: functions_of(machine),
         has_operators: program::has_operators(machine),
+        kept: None,
         identity: ExecutionIdentity::current().to_string(),
     })
 }

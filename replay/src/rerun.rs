@@ -13,6 +13,7 @@ use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Vm};
 
 use super::file::{Beginning, Recorded, RecordedError, is_own};
+use super::kept::set_kept;
 
 /// Why a recorded run cannot be run again.
 #[derive(Debug)]
@@ -279,5 +280,6 @@ pub fn prepare_recorded(
     program::set_module_folders(&mut machine, &beginning.folders)?;
     program::set_program_file(&mut machine, &beginning.program_file)?;
     program::set_traces(&mut machine, &beginning.traces)?;
+    beginning.kept.iter().try_for_each(|kept| set_kept(&mut machine, kept))?;
     Ok(machine)
 }

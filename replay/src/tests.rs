@@ -90,6 +90,7 @@ fn beginning() -> Beginning {
         program_file: vec!["main.esl".into(), "/main.esl".into()],
         functions: vec![GivenFunction { name: "F".into(), is_operation: true, needs: Vec::new() }],
         has_operators: true,
+        kept: Some("5\n(:fact (A))\n".into()),
         identity: ExecutionIdentity::current().to_string(),
     }
 }

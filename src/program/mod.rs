@@ -40,7 +40,7 @@ pub use identity::{EXECUTION_EPOCH, ExecutionIdentity};
 pub use operators::{TELL_OPERATOR, WRITE_OPERATOR, has_operators, load_operators};
 pub use run::{
     Ended, Summary, begin, begin_with, end, end_rest, finish, load, machine, run, run_by, run_in,
-    run_in_portions, set_module_folders, set_module_path, set_program_file, set_traces,
+    run_in_portions, set_kept, set_module_folders, set_module_path, set_program_file, set_traces,
 };
 pub use schedule::{Schedule, ScheduleError};
 

@@ -162,6 +162,15 @@ pub fn set_module_folders(machine: &mut Vm, folders: &[String]) -> Result<(), Er
     call_with_list(machine, "%SET-MODULE-PATH", folders)
 }
 
+/// Has a program begin with facts and variables of an earlier run: `data` are a number of milliseconds since
+/// then, and texts of lists, as `stdlib/durable.esl` reads them.
+///
+/// # Errors
+/// [`Error::NoMemory`], and those of a call, if a text cannot be read.
+pub fn set_kept(machine: &mut Vm, data: impl Iterator<Item = Datum>) -> Result<(), Error> {
+    call_with_list(machine, "%SET-KEPT", data)
+}
+
 /// Notes that a machine only compiles a program, so that messages about rights name no option of a run.
 ///
 /// # Errors

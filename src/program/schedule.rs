@@ -12,8 +12,8 @@
 //! ```
 //!
 //! Behind the grain, `strict` means a program that is compiled with points; behind the timers, the number of
-//! aborts by an operator is left out if there are none. The machine is the epoch of its
-//! behaviour and a checksum of its library: on another one, choices lead elsewhere.
+//! aborts by an operator is left out if there are none, and so is that of restarts, `crashes 1`. The machine
+//! is the epoch of its behaviour and a checksum of its library: on another one, choices lead elsewhere.
 
 use std::fmt;
 
@@ -54,6 +54,8 @@ pub struct Schedule {
     timers: TimerGrain,
     /// Most aborts by an operator.
     aborts: u32,
+    /// Most restarts that interrupt calls.
+    crashes: u32,
     turn: u32,
     choices: Vec<u32>,
 }
@@ -89,9 +91,9 @@ impl std::error::Error for ScheduleError {}
 impl Schedule {
     /// Returns the schedule with these choices, which an exploration with these settings has found.
     pub fn new(program: &Program, settings: &Settings, choices: Vec<u32>) -> Schedule {
-        let Settings { grain, strict, timers, aborts, turn, .. } = *settings;
+        let Settings { grain, strict, timers, aborts, crashes, turn, .. } = *settings;
         let (machine, program) = (this_machine(), checksum(program));
-        Schedule { machine, program, grain, strict, timers, aborts, turn, choices }
+        Schedule { machine, program, grain, strict, timers, aborts, crashes, turn, choices }
     }
 
     /// Parses the text of a file.
@@ -121,6 +123,8 @@ impl Schedule {
         let (grain, strict) = grain.strip_suffix(" strict").map_or((grain, false), |grain| (grain, true));
         let grain = Grain::from_name(grain).ok_or(wrong(4, "`changes`, `reads`, `variables` or `ticks`"))?;
         let timers = field(5, "timers", "`timers idle` or `timers any`")?;
+        let (timers, crashes) = timers.split_once(" crashes ").unwrap_or((timers, "0"));
+        let crashes = crashes.parse().map_err(|_| wrong(5, "`crashes` and a number"))?;
         let (timers, aborts) = timers.split_once(" aborts ").unwrap_or((timers, "0"));
         let timers = TimerGrain::from_name(timers).ok_or(wrong(5, "`idle` or `any`"))?;
         let aborts = aborts.parse().map_err(|_| wrong(5, "`aborts` and a number"))?;
@@ -133,7 +137,7 @@ impl Schedule {
         if !is_whole {
             return Err(wrong(8, "`end`, and nothing more"));
         }
-        Ok(Schedule { machine, program, grain, strict, timers, aborts, turn, choices })
+        Ok(Schedule { machine, program, grain, strict, timers, aborts, crashes, turn, choices })
     }
 
     /// Returns whether the schedule was found by a machine that behaves as this one does.
@@ -148,8 +152,8 @@ impl Schedule {
 
     /// Returns the settings with which the choices lead to where they were found.
     pub fn settings(&self) -> Settings {
-        let Schedule { grain, strict, timers, aborts, turn, .. } = *self;
-        Settings { grain, strict, timers, aborts, turn, ..Settings::default() }
+        let Schedule { grain, strict, timers, aborts, crashes, turn, .. } = *self;
+        Settings { grain, strict, timers, aborts, crashes, turn, ..Settings::default() }
     }
 
     /// Returns whether it is of the program as [`compile_with_points`](super::compile_with_points) compiles
@@ -173,6 +177,9 @@ impl fmt::Display for Schedule {
         write!(f, "grain {grain}{strict}\ntimers {timers}")?;
         if self.aborts > 0 {
             write!(f, " aborts {}", self.aborts)?;
+        }
+        if self.crashes > 0 {
+            write!(f, " crashes {}", self.crashes)?;
         }
         write!(f, "\nturn {}\nchoices", self.turn)?;
         self.choices.iter().try_for_each(|choice| write!(f, " {choice}"))?;
@@ -210,6 +217,9 @@ mod tests {
         let aborts = good.replace("any", "any aborts 2");
         let schedule = Schedule::parse(&aborts).expect("it is a schedule");
         assert_eq!((schedule.to_string(), schedule.settings().aborts), (aborts, 2));
+        let crashes = good.replace("any", "any aborts 2 crashes 1");
+        let schedule = Schedule::parse(&crashes).expect("it is a schedule");
+        assert_eq!((schedule.to_string(), schedule.settings().crashes), (crashes, 1));
         let line = |text: &str| match Schedule::parse(text) {
             Err(ScheduleError::Line { line, .. }) => line,
             other => panic!("{text}: {other:?}"),
@@ -223,6 +233,7 @@ mod tests {
             ("reads", "all", 4),
             ("any", "some", 5),
             ("any", "any aborts", 5),
+            ("any", "any crashes x", 5),
         ];
         let further = [("500", "0", 6), ("3", "x", 7), ("choices", "choice", 7), ("end", "", 8)];
         for (right, wrong, number) in wrong.into_iter().chain(further) {

@@ -99,6 +99,8 @@ pub struct ExploreOptions {
     pub states: Option<usize>,
     /// Most aborts of a schedule by an operator.
     pub aborts: u32,
+    /// Most restarts of a schedule, which interrupt calls.
+    pub crashes: u32,
     /// Whether tasks also stop before each use of a place that others may reach.
     pub strict: bool,
 }
@@ -168,7 +170,7 @@ pub fn list(program: &Program, setup: &Setup) -> Result<Vec<Test>, Error> {
 
 /// Returns how a test is explored, as the library has noted it.
 fn explore_options(noted: &Data) -> Option<ExploreOptions> {
-    let Some([grain, timers, states, strict, aborts]) = noted.as_list() else { return None };
+    let Some([grain, timers, states, strict, aborts, crashes]) = noted.as_list() else { return None };
     let name = |data: &Data| match data {
         Data::String(name) => Some(name.clone()),
         _ => None,
@@ -177,11 +179,13 @@ fn explore_options(noted: &Data) -> Option<ExploreOptions> {
         Data::Integer(number) => Some(usize::try_from(*number).unwrap_or(usize::MAX)),
         _ => None,
     };
+    let count = |data: &Data| number(data).map_or(0, |count| u32::try_from(count).unwrap_or(u32::MAX));
     Some(ExploreOptions {
         grain: name(grain).and_then(|name| Grain::from_name(&name)),
         timers: name(timers).and_then(|name| TimerGrain::from_name(&name)),
         states: number(states),
-        aborts: number(aborts).map_or(0, |aborts| u32::try_from(aborts).unwrap_or(u32::MAX)),
+        aborts: count(aborts),
+        crashes: count(crashes),
         strict: !strict.as_list().is_some_and(<[Data]>::is_empty),
     })
 }
@@ -365,11 +369,12 @@ fn explore_grains(
 ) -> Result<Verdict, Error> {
     let strict = setup.with_points.as_ref().is_some_and(|marked| std::ptr::eq(&**marked, program));
     let states = options.states.unwrap_or(Settings::default().states);
-    let (timers, aborts) = (options.timers.unwrap_or_default(), options.aborts);
+    let ExploreOptions { aborts, crashes, .. } = options;
+    let timers = options.timers.unwrap_or_default();
     let mut verdict = Verdict::Passed;
     for grain in grains(program, options.grain) {
         let settings =
-            Settings { grain, timers, aborts, states, strict, output: false, ..Settings::default() };
+            Settings { grain, timers, aborts, crashes, states, strict, output: false, ..Settings::default() };
         let found = explore_at(program, test, &settings, setup, &mut || true)?;
         let scope = ExplorationScope::new(program, &settings, &found);
         let failed = |why: &str, output| Verdict::Failed { why: format!("{why} ({scope})"), output };

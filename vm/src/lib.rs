@@ -17,6 +17,7 @@ pub mod task;
 pub mod vm;
 
 pub use names::{load, records};
+pub use report::KeptData;
 pub use snapshot::Snapshot;
 
 /// Number of the machine's behaviour, as far as a run can tell: what work costs how many ticks, when slices

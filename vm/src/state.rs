@@ -237,6 +237,7 @@ list_state! { Points {
     requested: Process,
     has_guards: Process,
     asked: Run,
+    asked_for: Process,
     chosen: Run,
     is_strict: Process,
     uses: Process,

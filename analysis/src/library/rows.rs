@@ -390,6 +390,7 @@ const OF_FORMS: &[&str] = &[
     "ALL-FAILED",
     "ABORTED",
     "CANCELLED",
+    "INTERRUPTED-BY-RESTART",
     "OPERATION-BUSY",
     "SUPERSEDED",
     "LINE-TOO-LONG",

@@ -6,8 +6,8 @@ use esl_heap::heap::layout::StructureObject;
 use esl_heap::heap::{AllocError, Heap, Kind};
 use esl_heap::table::{KeyComparison, Table};
 
-use super::super::Describe;
 use super::super::bucket::{finish, mix};
+use super::super::{Describe, TermContents};
 use super::{Term, TermData, Terms};
 
 impl Terms {
@@ -185,6 +185,23 @@ impl Terms {
             TermData::Float(bits) => heap.float(f64::from_bits(*bits)),
             TermData::Object(v) => Ok(*v),
             TermData::Free | TermData::Pair { .. } | TermData::Record(..) => Ok(Value::NIL),
+        }
+    }
+
+    /// Returns the contents of a term, as far as data stand for them.
+    pub(crate) fn contents(&self, term: Term) -> TermContents<'_> {
+        let Some(index) = term.0.as_term() else { return TermContents::Word(term.0) };
+        match &self.nodes[index as usize].data {
+            TermData::Pair { car, cdr, .. } => TermContents::Pair(*car, *cdr),
+            TermData::Text(characters) => TermContents::Text(characters),
+            TermData::Big(negative, limbs) => TermContents::Big(*negative, limbs),
+            TermData::Ratio(numerator, denominator) => TermContents::Ratio(*numerator, *denominator),
+            TermData::Float(bits) => TermContents::Float(f64::from_bits(*bits)),
+            TermData::Free
+            | TermData::Bits(_)
+            | TermData::Complex(..)
+            | TermData::Record(..)
+            | TermData::Object(_) => TermContents::Object,
         }
     }
 

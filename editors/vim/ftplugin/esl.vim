@@ -9,7 +9,7 @@ setlocal iskeyword=@,48-57,42,43,45,47,60,61,62,63,33,58,36,37,38,94,95,126
 setlocal comments=:;;;;,:;;;,:;;,:; commentstring=;\ %s
 setlocal define=^\\s*(def
 setlocal formatprg=eslc\ format\ -
-setlocal lispwords=defun,defmacro,defvar,defparameter,defconstant,defstruct,defclass,defgeneric,defmethod
+setlocal lispwords=defun,defmacro,defvar,defdurable,defparameter,defconstant,defstruct,defclass,defgeneric,defmethod
 setlocal lispwords+=define-condition,define-cause,define-fluent,define-rule,define-property,define-mock
 setlocal lispwords+=deftest,deftype,defpackage,let,let*,flet,labels,macrolet,symbol-macrolet,lambda,when
 setlocal lispwords+=unless,case,ecase,typecase,etypecase,dolist,dotimes,do,do*,block,catch,eval-when

@@ -6,6 +6,7 @@
 use std::fmt;
 
 use esl::program::Program;
+use esl_bytecode::module::Constant;
 
 use super::unseen::{UnseenKind, unseen_changes};
 use super::{Exploration, Grain, SearchLimit, Settings, TimerGrain, UnseenChange};
@@ -29,6 +30,10 @@ pub struct ExplorationScope {
     pub timers: TimerGrain,
     /// Most aborts of a schedule by an operator.
     pub aborts: u32,
+    /// Most restarts of a schedule, which interrupt calls.
+    pub crashes: u32,
+    /// Whether the program deals with restarts, by name.
+    pub has_restarts: bool,
     /// Changes of the program that the grain does not see.
     pub unseen: Vec<UnseenChange>,
     /// The limit that kept the search from trying everything at this grain.
@@ -46,6 +51,8 @@ impl ExplorationScope {
             grain: settings.grain,
             timers: settings.timers,
             aborts: settings.aborts,
+            crashes: settings.crashes,
+            has_restarts: deals_with_restarts(program),
             unseen: unseen_changes(program, settings.grain),
             limit: found.limit,
             states: found.states,
@@ -84,6 +91,15 @@ impl ExplorationScope {
     }
 }
 
+/// Returns whether a program names the cause of an interrupted call, or the input of a restart.
+fn deals_with_restarts(program: &Program) -> bool {
+    let is_name = |constant: &Constant| match constant {
+        Constant::Symbol(symbol) => matches!(symbol.name(), "INTERRUPTED-BY-RESTART" | "*RESUMED*"),
+        _ => false,
+    };
+    program.module().constants.iter().any(is_name)
+}
+
 /// Grain, timers and figures.
 impl fmt::Display for ExplorationScope {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -94,6 +110,9 @@ impl fmt::Display for ExplorationScope {
         write!(f, "grain {grain}, timers {timers}")?;
         if self.aborts > 0 {
             write!(f, ", aborts {}", self.aborts)?;
+        }
+        if self.crashes > 0 {
+            write!(f, ", crashes {}", self.crashes)?;
         }
         write!(f, "; {states}, {runs}")
     }

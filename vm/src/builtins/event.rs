@@ -10,7 +10,7 @@ use crate::heap::{Heap, Kind};
 use crate::number;
 use crate::raise::{Exit, Outcome};
 use crate::run;
-use crate::schedule::TurnEnd;
+use crate::schedule::{AskedFor, TurnEnd};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{WaitOptions, event, input, link};
@@ -488,7 +488,8 @@ pub(super) fn choose(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(count) = arguments[0].as_index().filter(|&count| count > 0) else {
         return vm.exchange.not_written(arguments[0], "(INTEGER 1)");
     };
-    Ok(Value::index(vm.scheduler.choose(count)?))
+    let asked_for = AskedFor::of_way(optional(arguments, 1).as_index());
+    Ok(Value::index(vm.scheduler.choose(count, asked_for)?))
 }
 
 /// Done again when the others have had their turns.

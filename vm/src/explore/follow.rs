@@ -6,6 +6,7 @@ use super::tasks::watch_variables;
 use super::{Settings, TimerGrain};
 use crate::run::RunOutcome;
 use crate::schedule::{Choices, Grain};
+use crate::value::Value;
 use crate::vm::Vm;
 
 /// A run by a list of choices, which may be given its ticks in portions.
@@ -135,4 +136,11 @@ pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     };
     vm.scheduler.choices = Choices::first();
     vm.outside.console.note_all(settings.output);
+    if settings.crashes > 0 {
+        let count = Value::index(settings.crashes as usize);
+        // Without room for the name there is none for the program either.
+        if let Ok(name) = vm.names.intern_esl(&mut vm.heap, "*%CRASHES*") {
+            _ = vm.set_symbol_value(name, count);
+        }
+    }
 }

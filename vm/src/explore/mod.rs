@@ -169,6 +169,8 @@ pub struct Settings {
     pub fairness: Fairness,
     /// Most aborts of a schedule by an operator, who may ask any task of the program to end, at any point.
     pub aborts: u32,
+    /// Most restarts of a schedule, which the library has interrupt calls of mocks and scripts.
+    pub crashes: u32,
 }
 
 impl Default for Settings {
@@ -189,6 +191,7 @@ impl Default for Settings {
             counts: false,
             fairness: Fairness::Weak,
             aborts: 0,
+            crashes: 0,
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::heap::Kind;
 use crate::interp::frames::Frames;
 use crate::names::class;
 use crate::report::{program_place, task_label};
-use crate::schedule::{SharedUse, UsedPlace};
+use crate::schedule::{AskedFor, SharedUse, UsedPlace};
 use crate::task::{Task, TaskId, TaskIndex};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -73,6 +73,13 @@ pub enum Switch {
         task: StandingTask,
         /// Nanoseconds that have passed.
         passed: u64,
+    },
+    /// A restart of the durable run has interrupted a call of an operation.
+    Restart {
+        /// The task that performs the call.
+        task: StandingTask,
+        /// Whether the call has had its effect.
+        is_behind: bool,
     },
     /// `choose` has taken another form than its first.
     Choice {
@@ -239,7 +246,11 @@ pub(super) fn switch(vm: &mut Vm, runnable: Runnable<'_>, choice: u32) -> Switch
     }
     let first = StandingTask::of(vm, runnable.tasks.first().copied().unwrap_or(TaskIndex::NONE));
     if runnable.ways.is_some() {
-        return Switch::Choice { task: first, form: choice };
+        return match vm.scheduler.points.asked_for {
+            AskedFor::Form => Switch::Choice { task: first, form: choice },
+            AskedFor::RestartBefore => Switch::Restart { task: first, is_behind: false },
+            AskedFor::RestartBehind => Switch::Restart { task: first, is_behind: true },
+        };
     }
     if choice as usize == runnable.tasks.len() && runnable.has_timer {
         let now = vm.scheduler.clock.now;

@@ -4,6 +4,7 @@ mod calls;
 mod figures;
 mod history;
 mod holders;
+mod kept;
 mod label;
 mod observe;
 mod stand;
@@ -16,6 +17,7 @@ mod variables;
 pub(crate) use calls::note_end_in_meter;
 pub(crate) use figures::note_end_in_figures;
 pub(crate) use history::NotedFrame;
+pub use kept::KeptData;
 pub(crate) use label::{
     arguments_label, cause_label, end_label, event_label, failure_arguments, label_of, lack_of, reason_of,
     report_in_short, task_label,

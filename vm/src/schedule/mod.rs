@@ -27,7 +27,7 @@ pub(crate) use account::{AccountOwner, Accounts, Amount, Measure};
 pub use choices::Choices;
 pub(crate) use clock::Clock;
 pub use point::Grain;
-pub(crate) use point::{Points, SharedUse, UsedPlace};
+pub(crate) use point::{AskedFor, Points, SharedUse, UsedPlace};
 pub(crate) use portion::{OpenSlice, OpenTurn};
 pub(crate) use queues::RunQueues;
 pub(crate) use timer::{Due, Timer, Timers};

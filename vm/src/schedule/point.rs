@@ -47,6 +47,29 @@ impl Grain {
     }
 }
 
+/// A choice that a task asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum AskedFor {
+    /// One of the forms of `choose`.
+    #[default]
+    Form,
+    /// Whether a restart interrupts a call before its effect.
+    RestartBefore,
+    /// Whether a restart interrupts a call behind its effect.
+    RestartBehind,
+}
+
+impl AskedFor {
+    /// Returns the choice that a builtin asks for by this number.
+    pub(crate) fn of_way(way: Option<usize>) -> AskedFor {
+        match way {
+            Some(1) => AskedFor::RestartBefore,
+            Some(2) => AskedFor::RestartBehind,
+            _ => AskedFor::Form,
+        }
+    }
+}
+
 /// A place that tasks may share.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum UsedPlace {
@@ -105,6 +128,8 @@ pub(crate) struct Points {
     pub(crate) has_guards: bool,
     /// Number of ways among which the task that ran last wants one to be chosen.
     pub(crate) asked: Option<usize>,
+    /// The purpose of these ways.
+    pub(crate) asked_for: AskedFor,
     /// The alternative that was chosen for it.
     pub(crate) chosen: Option<usize>,
     /// Whether tasks stop before uses of places that others may reach.
@@ -200,7 +225,7 @@ impl Scheduler {
     ///
     /// # Errors
     /// [`Exit::Again`] if the explorer is to choose; the builtin will be done again.
-    pub(crate) fn choose(&mut self, count: usize) -> Result<usize, Exit> {
+    pub(crate) fn choose(&mut self, count: usize, asked_for: AskedFor) -> Result<usize, Exit> {
         if self.points.grain.is_none() {
             return Ok(self.choices.choose(count));
         }
@@ -210,7 +235,7 @@ impl Scheduler {
         if self.task().critical > 0 || count == 1 {
             return Ok(0);
         }
-        self.points.asked = Some(count);
+        (self.points.asked, self.points.asked_for) = (Some(count), asked_for);
         self.task_mut().flags.set_at_point(true);
         self.turn.end_with(TurnEnd::Passed);
         Err(Exit::Again)

@@ -8,9 +8,10 @@ use esl::module_path::ModulePath;
 use esl::program::{self, Instrumentation};
 use esl_command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain};
 use esl_durable::{
-    Downtime, Durability, DurableError, DurableOptions, DurableRun, Resumed, SnapshotEvery, UpgradeReport,
+    Downtime, Durability, DurableError, DurableOptions, DurableRun, KeptFacts, Resumed, SnapshotEvery,
+    UpgradeReport,
 };
-use esl_replay::RunSetup;
+use esl_replay::{RecordedError, RunSetup};
 use esl_vm::vm::Tier;
 
 use super::figures::{print_snapshots, print_stats};
@@ -19,6 +20,9 @@ use super::program::{complain_of_signal, program_with_sources};
 use super::run::RunReports;
 use crate::operate::tell_manager;
 use crate::signal::{SignalTarget, end_on_signal_unless};
+
+/// Things missing in the facts of an earlier run that are named.
+const LEFT_OUT: usize = 5;
 
 /// Options of a durable run.
 #[derive(Args)]
@@ -47,6 +51,10 @@ pub(crate) struct StateOptions {
     /// another one
     #[arg(long, requires = "state")]
     pub(crate) upgrade: bool,
+    /// If the durable run is of another version of eslvm, begin its program anew, with its facts and the
+    /// variables of DEFDURABLE as they were at the last pause or snapshot
+    #[arg(long, requires = "state")]
+    pub(crate) from_facts: bool,
 }
 
 /// The events that a durable run survives.
@@ -81,7 +89,8 @@ pub(super) fn refused(error: &DurableError) -> u8 {
     complain(error);
     match error {
         DurableError::Diverged(_) => DIVERGED,
-        DurableError::Journal(esl_replay::RecordedError::OtherMachine) => DIVERGED,
+        DurableError::Journal(RecordedError::OtherMachine | RecordedError::Format(_))
+        | DurableError::NoFacts => DIVERGED,
         DurableError::Journal(_) | DurableError::Program(_) => NOT_COMPILED,
         _ => USAGE,
     }
@@ -120,8 +129,12 @@ pub(crate) fn run_durable(
         DurabilityChoice::Power => Durability::Power,
     };
     let snapshots = state.snapshot_every.unwrap_or_default();
-    let mut run = DurableRun::open(folder, DurableOptions { durability, downtime, snapshots, hosted: None })
-        .map_err(refuse)?;
+    let options_of_run =
+        DurableOptions { durability, downtime, snapshots, hosted: None, from_facts: state.from_facts };
+    let mut run = DurableRun::open(folder, options_of_run).map_err(refuse)?;
+    if let Some(kept) = run.kept_facts() {
+        say_kept(kept);
+    }
     run.warnings().iter().for_each(complain);
     run.control().on_warning(|text| complain(text));
     let (signals, control) = (SignalTarget::default(), run.control());
@@ -161,6 +174,7 @@ pub(crate) fn run_durable(
     program::set_module_folders(&mut machine, &folders).map_err(setup)?;
     program::set_program_file(&mut machine, &program_file).map_err(setup)?;
     program::set_traces(&mut machine, reports.trace).map_err(setup)?;
+    run.prepare(&mut machine).map_err(refuse)?;
     if reports.stats.is_some() {
         machine.gather_figures(false);
     }
@@ -233,6 +247,24 @@ fn say_resumed(resumed: &Resumed) {
         );
     }
     complain(text);
+}
+
+/// Reports the facts from which a run begins anew.
+fn say_kept(kept: &KeptFacts) {
+    let (facts, variables) = (counted(kept.facts, "fact"), counted(kept.variables, "variable"));
+    let when = if kept.is_pause { "its pause" } else { "a snapshot, behind which it went on" };
+    complain(format_args!(
+        "the run was begun by another version of eslvm, and begins anew with {facts} and {variables}, as at {when}, \
+         {:.1} s ago; its files are in {}",
+        kept.seconds,
+        kept.earlier.display()
+    ));
+    for what in kept.left_out.iter().take(LEFT_OUT) {
+        complain(format_args!("missing: {what}"));
+    }
+    if kept.left_out.len() > LEFT_OUT {
+        complain(format_args!("missing: {} more", kept.left_out.len() - LEFT_OUT));
+    }
 }
 
 /// Reports the effects of an upgrade.

@@ -58,6 +58,7 @@ pub(crate) fn run_explore(
         switches: options.switches,
         faults: options.faults,
         aborts: options.aborts,
+        crashes: options.crashes,
         output: false,
         fairness: match options.fairness {
             FairnessChoice::Weak => explore::Fairness::Weak,

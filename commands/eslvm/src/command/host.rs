@@ -170,7 +170,7 @@ pub(crate) fn run_host(options: &HostOptions) -> Result<u8, u8> {
     };
     let snapshots = options.snapshot_every.unwrap_or_default();
     let settings = HostSettings {
-        durable: DurableOptions { durability, downtime, snapshots, hosted: None },
+        durable: DurableOptions { durability, downtime, snapshots, hosted: None, from_facts: false },
         rights,
         sleep_after: options.sleep_after,
         awake: options.awake as usize,

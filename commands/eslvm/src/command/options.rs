@@ -397,6 +397,10 @@ pub(crate) struct ExploreArguments {
     /// Most aborts of a schedule by an operator, who may ask any task but the main one to end, at any point
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) aborts: u32,
+    /// Most restarts of a schedule, as of a durable run: each interrupts a call of a mock or of a script,
+    /// before its effect or behind it, and signals *RESUMED*
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) crashes: u32,
     /// Schedules without an end that are findings: those that are fair to each task, or all
     #[arg(long, value_enum, default_value = "weak")]
     pub(crate) fairness: FairnessChoice,

@@ -270,7 +270,7 @@ impl CommandExploration<'_> {
         say!(
             "{}",
             json!({
-                "verdict": verdict, "grain": grain, "timers": timers, "aborts": scope.aborts, "unseen": unseen, "states": states,
+                "verdict": verdict, "grain": grain, "timers": timers, "aborts": scope.aborts, "crashes": scope.crashes, "unseen": unseen, "states": states,
                 "runs": runs, "findings": count, "limit": limit, "endless": self.options.is_endless,
                 "fairness": if fairness == Fairness::Weak { "weak" } else { "none" },
                 "seconds": self.started.elapsed().as_secs_f64(),
@@ -449,7 +449,9 @@ fn print_summary(scope: &ExplorationScope, tried: &[ExplorationScope], cycle: Op
     }
     let timers = (scope.timers == TimerGrain::Idle).then_some("timers that end early (--timers any)");
     let aborts = (scope.aborts == 0).then_some("aborts by an operator (--aborts)");
-    let left: Vec<&str> = [timers, aborts, cycle].into_iter().flatten().collect();
+    let crashes =
+        (scope.crashes == 0 && scope.has_restarts).then_some("restarts of a durable run (--crashes)");
+    let left: Vec<&str> = [timers, aborts, crashes, cycle].into_iter().flatten().collect();
     if !left.is_empty() {
         say!("not tried: {}", left.join("; "));
     }

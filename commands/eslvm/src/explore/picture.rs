@@ -139,7 +139,9 @@ pub(super) fn draw<'a>(
         };
         let (x, colour) = (lanes[lane].x, lane % COLOURS);
         let class = match &row.kind {
-            StepRowKind::Switch(Switch::Preemption { .. } | Switch::Abort { .. }) => {
+            StepRowKind::Switch(
+                Switch::Preemption { .. } | Switch::Abort { .. } | Switch::Restart { .. },
+            ) => {
                 put(format_args!(
                     "<path class=\"stop\" d=\"M{:.1} {y:.1}H{:.1}\"/>",
                     x - 2.0 * SIGN,

@@ -153,6 +153,7 @@ fn switch_row(time: u64, switch: &Switch) -> Option<StepRow> {
         Switch::Preemption { stopped, .. } => (stopped, "has to stop before".to_owned()),
         Switch::Order { .. } => return None,
         Switch::Abort { task } => (task, "is asked to end by an operator".to_owned()),
+        Switch::Restart { task, is_behind } => (task, interruption(*is_behind).to_owned()),
         Switch::Timer { passed, .. } => {
             let text = format!("{} s pass, and timers end", seconds(*passed));
             let kind = StepRowKind::Switch(switch.clone());
@@ -252,6 +253,15 @@ pub(super) fn json(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Json>
     rows.iter().map(item).collect()
 }
 
+/// Returns a restart in words.
+fn interruption(is_behind: bool) -> &'static str {
+    if is_behind {
+        "a restart interrupts it behind its effect"
+    } else {
+        "a restart interrupts it before its effect"
+    }
+}
+
 pub(super) fn seconds(time: u64) -> f64 {
     time as f64 / 1e9
 }
@@ -298,6 +308,9 @@ fn switch_json(time: f64, switch: &Switch, forms: &mut SourceForms) -> Json {
         Switch::Timer { task: waiting, passed } => {
             json!({ "kind": "timer", "time": time, "passed": seconds(*passed), "before": task(waiting) })
         }
+        Switch::Restart { task: performing, is_behind } => {
+            json!({ "kind": "restart", "time": time, "interrupts": task(performing), "has-effect": is_behind })
+        }
         Switch::Choice { task: asking, form } => {
             json!({ "kind": "choice", "time": time, "chooses": task(asking), "number": form + 1 })
         }
@@ -322,6 +335,9 @@ pub(super) fn text(switch: &Switch, forms: &mut SourceForms) -> String {
         }
         Switch::Abort { task } => {
             format!("an operator asks {} to end{}", task.label, place(task, "at"))
+        }
+        Switch::Restart { task, is_behind } => {
+            format!("{}: {}{}", task.label, interruption(*is_behind), place(task, "at"))
         }
         Switch::Timer { task, passed } => format!(
             "{} s pass, and timers end,\nbefore {} goes on{}",

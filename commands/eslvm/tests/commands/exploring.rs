@@ -442,3 +442,41 @@ fn an_update_that_is_safe_by_chance_is_fragile() {
         "{output}"
     );
 }
+
+/// Restarts of a durable run are choices, and the table of a finding names them.
+#[test]
+fn restarts_are_told() {
+    let folder = Folder::new("exploring-restarts");
+    let program = |procedure: &str| {
+        format!(
+            "(defvar *moved* 0)
+(define-mock move-arm (place) (incf *moved*) place)
+(define-mock arm-is-at (place) (and (> *moved* 0) place))
+(define-idempotent arm-is-at)
+(always at-most-once (<= *moved* 1))
+(with-recovery-procedures (((:interrupted-by-restart) :retries :infinite {procedure}))
+  (move-arm 'tray))
+"
+        )
+    };
+    folder.file("once.esl", program("(if (arm-is-at 'tray) (abort 'tray) (retry))"));
+    folder.file("twice.esl", program("(retry)"));
+    let (status, output, _) = run(&folder, &["explore", "twice.esl"]);
+    assert!(status == Some(0) && output.contains("; restarts of a durable run (--crashes)"), "{output}");
+    let (status, output, errors) = run(&folder, &["explore", "--crashes", "2", "once.esl"]);
+    assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
+    assert!(
+        output.starts_with("complete: no schedule ends badly (grain variables, timers idle, crashes 2;"),
+        "{output}"
+    );
+    let (status, output, _) = run(&folder, &["explore", "--crashes", "1", "twice.esl"]);
+    assert_eq!(status, Some(1), "{output}");
+    assert!(output.contains("a restart interrupts it behind its effect"), "{output}");
+    let (status, _, errors) = run(&folder, &["run", "--schedule", "twice-1.schedule", "twice.esl"]);
+    assert!(
+        status == Some(1) && errors.contains("AT-MOST-ONCE, which always has to hold, is false"),
+        "{errors}"
+    );
+    let (_, output, _) = run(&folder, &["explore", "--crashes", "1", "--json", "twice.esl"]);
+    assert!(output.contains("\"kind\":\"restart\"") && output.contains("\"crashes\":1"), "{output}");
+}

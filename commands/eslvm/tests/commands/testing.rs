@@ -296,9 +296,10 @@ fn options_that_a_test_does_not_have_are_refused() {
         ),
         (
             ":explore (:grian ticks)",
-            "explores by :GRAIN, :TIMERS, :STATES, :STRICT and :ABORTS, not by :GRIAN",
+            "explores by :GRAIN, :TIMERS, :STATES, :STRICT, :ABORTS and :CRASHES, not by :GRIAN",
         ),
         (":explore (:aborts -1)", "needs a number of :ABORTS, not -1"),
+        (":explore (:crashes t)", "needs a number of :CRASHES, not T"),
         (":explore (:timers 3)", "needs a way of timers behind :EXPLORE, one of IDLE, ANY, not 3"),
         (":explore (:states 0)", "needs a positive number of :STATES, not 0"),
         (":explore ticks", "needs T or a list such as (:GRAIN TICKS) behind :EXPLORE, not TICKS"),

@@ -3,6 +3,7 @@
 mod aborts;
 mod composition;
 mod corpus;
+mod crashes;
 mod defects;
 mod everywhere;
 mod fluents;
