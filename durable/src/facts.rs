@@ -109,7 +109,7 @@ fn text_of(kept: &KeptData, wall: i64, is_pause: bool) -> String {
 /// Reads a text; `None` if it is not a whole one of this version.
 fn read(folder: &Path, text: String, wall: i64) -> Option<KeptFacts> {
     let mut lines = text.lines();
-    if lines.next() != Some(HEADER) || text.lines().last() != Some(END) {
+    if lines.next() != Some(HEADER) || text.lines().next_back() != Some(END) {
         return None;
     }
     let words: Vec<&str> = lines.next()?.split(' ').collect();
