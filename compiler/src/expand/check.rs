@@ -15,7 +15,7 @@ use esl_bytecode::symbol::{CL_PACKAGE, Symbol};
 use rustc_hash::FxHashMap;
 
 use super::argument::usage;
-use super::directive::arguments_of;
+use super::directive::{arguments_of, unknown_directive};
 use super::expander::Expander;
 use super::form::{Form, is_known, name, on_one_line, operator, plain};
 use super::global::CauseArguments;
@@ -121,6 +121,14 @@ impl Expander {
     /// Checks a control string, the part `at` of a form, against the arguments after it.
     fn directives(&mut self, form: &Form, at: usize, origin: Option<OriginId>) {
         let Some(DatumKind::String(control)) = form.args.get(at).map(Datum::kind) else { return };
+        if let Some(directive) = unknown_directive(control)
+            && !self.is_guarded(form.span)
+        {
+            let message = format!("there is no directive `{directive}`");
+            let help = "`~a` prints a value for people, `~s` as it is read; a `~` by itself is written `~~`";
+            self.report(code::WRONG_ARGUMENT.at(form.at(form.args[at].span()), message).help(help), origin);
+            return;
+        }
         let Some(takes) = arguments_of(control) else { return };
         let given = form.args.len() - at - 1;
         if given >= takes.min && takes.max.is_none_or(|max| given <= max) || self.is_guarded(form.span) {

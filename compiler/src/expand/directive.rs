@@ -64,6 +64,23 @@ pub(super) fn arguments_of(control: &str) -> Option<DirectiveArguments> {
     Some(sum)
 }
 
+/// Characters of the directives that there are.
+const KNOWN: &str = "abcdefgioprstwx$%&|~*?^[]{}();<>_/\n";
+
+/// Returns the first directive that there is not, as it is written.
+pub(super) fn unknown_directive(control: &str) -> Option<String> {
+    let mut characters = control.chars().peekable();
+    while let Some(character) = characters.next() {
+        if character == '~' {
+            let kind = next_directive(&mut characters)?.kind;
+            if !KNOWN.contains(kind) {
+                return Some(format!("~{kind}"));
+            }
+        }
+    }
+    None
+}
+
 /// Takes the rest of a directive, behind its `~`.
 fn next_directive(characters: &mut Peekable<Chars<'_>>) -> Option<Directive> {
     let mut directive = Directive { kind: ' ', has_at: false, has_colon: false, taken: 0 };
@@ -113,6 +130,15 @@ mod tests {
 
     /// A control string, and the least and the largest number of its arguments.
     type Row = (&'static str, Option<(usize, Option<usize>)>);
+
+    #[test]
+    fn directives_that_there_are_not_are_found() {
+        let table = [("~a ~q", Some("~q")), ("~2,'0q", Some("~q")), ("~Z", Some("~z")), ("~ a", Some("~ "))];
+        let known = ["", "~", "~'", "a q", "~~q", "~,2f~10@<~a~>~:[no~;yes~]~^~*", "~\n  x", "~/q/"];
+        for (control, expected) in table.into_iter().chain(known.map(|control| (control, None))) {
+            assert_eq!(unknown_directive(control).as_deref(), expected, "{control}");
+        }
+    }
 
     #[test]
     fn directives_take_arguments() {

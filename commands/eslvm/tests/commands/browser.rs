@@ -214,6 +214,10 @@ fn the_page_is_readable_at_any_width_and_keeps_the_end_of_the_run() {
     browser.until("getComputedStyle(drawing.querySelector('.task.lit > rect')).strokeWidth === '2.5px'");
     browser.until("drawing.querySelector('.task.lit[data-name=main]') !== null");
     browser.until("drawing.querySelectorAll('.path.arrow.takes').length === 1 && view.mission === 'live'");
+    // The only clause that takes it counts, too.
+    browser.until(
+        "drawing.querySelector(`[data-line='${drawing.querySelector('.path.arrow.takes').dataset.to}'] .count`).textContent === '  ×5'",
+    );
     browser.press("2");
     browser.until("/^[0-9]+ s more$|^[0-9]+:[0-9]+ more$/.test(document.getElementById('row-' + last.rows.find(row => row.count === 200).n).children[3].textContent)");
     for width in [1400, 420] {
