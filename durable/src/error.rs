@@ -35,7 +35,7 @@ pub enum DurableError {
     /// There are no facts from which the run of another version of the machine could begin anew.
     NoFacts,
     /// The facts from which the run is to begin anew cannot be read.
-    Facts(esl::Error),
+    Facts(Box<esl::Error>),
     /// The program contains an object that no file can hold.
     Program(WriteError),
     /// The folder has the run of another program: the changes.

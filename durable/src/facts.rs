@@ -247,7 +247,7 @@ impl DurableRun {
             (None, Some(kept)) => kept.to_owned(),
             (None, None) => return Ok(()),
         };
-        esl_replay::set_kept(machine, &kept).map_err(DurableError::Facts)
+        esl_replay::set_kept(machine, &kept).map_err(|error| DurableError::Facts(Box::new(error)))
     }
 
     /// Notes that the run has begun with the facts, so that it goes on by its journal.
