@@ -110,15 +110,9 @@ fn a_simulated_arm_in_another_process_clears_its_table() {
     let mut run = Run::start(script, "2");
     run.wait_for("blocks are in the tray, the battery was charged");
     assert!(run.has_seen("4 of 4 blocks are in the tray"), "{:#?}", run.seen);
-    // The wall stops a finger in every run. The second try sometimes succeeds, when the block has been pushed
-    // away from the wall; else the block is grasped across.
-    for text in [
-        "camera is reset",
-        "lost the green block",
-        "the arm stopped",
-        "percent, charging",
-        "motors are stopped",
-    ] {
+    // Whether the wall stops the arm, too, depends on where a first try has pushed the block; and the battery
+    // lasts without the tries after that. All of it happens in the world of scripts.
+    for text in ["camera is reset", "lost the green block", "motors are stopped"] {
         assert!(run.has_seen(text), "{text}: {:#?}", run.seen);
     }
     assert!(run.child.wait().is_ok_and(|status| status.success()));
