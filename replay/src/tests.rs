@@ -269,8 +269,8 @@ fn a_file_that_is_changed_anywhere_is_refused() {
     }
     assert_eq!(Recorded::read(b"(defun f ())").err(), Some(RecordedError::NotOne));
     let mut other = bytes.clone();
-    other[8] = 9;
-    assert_eq!(Recorded::read(&other).err(), Some(RecordedError::Format(9)));
+    other[8] = u8::MAX;
+    assert_eq!(Recorded::read(&other).err(), Some(RecordedError::Format(u32::from(u8::MAX))));
     let twice = [&bytes[..], &bytes[12..]].concat();
     assert!(matches!(Recorded::read(&twice), Err(RecordedError::Damaged { .. })));
 }
