@@ -51,7 +51,7 @@ pub(crate) enum ConfiguredPlace {
 const PROTOCOLS: [&str; 4] = ["tcp", "tls", "udp", "unixsock-stream"];
 /// Protocols that Zenoh has, and sessions here do not speak.
 const OTHER_PROTOCOLS: [&str; 6] = ["quic", "quic_datagram", "serial", "unixpipe", "vsock", "ws"];
-/// Where the settings of TLS are that name files.
+/// The path of the settings of TLS.
 const TLS: &str = "transport/link/tls";
 /// Settings of TLS that name files.
 const TLS_FILES: [&str; 5] = [

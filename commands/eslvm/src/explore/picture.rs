@@ -43,7 +43,7 @@ text { font: 12px monospace; white-space: pre; fill: var(--text); paint-order: s
 /// A task of the picture.
 struct Lane<'a> {
     task: &'a str,
-    /// Where its line is.
+    /// The place of its line, in pixels from the left.
     x: f64,
 }
 
