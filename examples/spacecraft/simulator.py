@@ -292,6 +292,8 @@ class Link:
                 if self.connection or craft.body.now < craft.back_at:
                     connection.close()
                 else:
+                    # The executive may be back before the next step notices that it was away.
+                    craft.under_way.clear()
                     connection.setblocking(False)
                     self.selector.register(connection, selectors.EVENT_READ)
                     self.connection, self.received, self.unsent = connection, b"", b""
