@@ -27,8 +27,10 @@ pub enum TermContents<'a> {
     Ratio(Term, Term),
     /// A double float.
     Float(f64),
-    /// Another object of the heap, or one that is compared by its slots.
-    Object,
+    /// Another object of the heap.
+    Object(Value),
+    /// One that no data stand for, such as one that is compared by its slots.
+    Other,
 }
 
 /// A relation, as it is seen from outside.

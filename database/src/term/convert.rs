@@ -197,11 +197,10 @@ impl Terms {
             TermData::Big(negative, limbs) => TermContents::Big(*negative, limbs),
             TermData::Ratio(numerator, denominator) => TermContents::Ratio(*numerator, *denominator),
             TermData::Float(bits) => TermContents::Float(f64::from_bits(*bits)),
-            TermData::Free
-            | TermData::Bits(_)
-            | TermData::Complex(..)
-            | TermData::Record(..)
-            | TermData::Object(_) => TermContents::Object,
+            TermData::Object(object) => TermContents::Object(*object),
+            TermData::Free | TermData::Bits(_) | TermData::Complex(..) | TermData::Record(..) => {
+                TermContents::Other
+            }
         }
     }
 

@@ -78,6 +78,25 @@ pub(crate) fn export(
     value: Value,
     describe: fn(&Heap, Value) -> String,
 ) -> Result<(Datum, usize), DatumError> {
+    export_by(heap, names, value, Unit { describe: Some(describe), ..Unit::default() })
+}
+
+/// As [`export`], where structures of programs are lists: the symbol `%KEPT-STRUCTURE`, the name of the
+/// structure, and the name and the value of each slot.
+///
+/// # Errors
+/// [`DatumError`].
+pub(crate) fn export_structures(
+    heap: &Heap,
+    names: &Names,
+    value: Value,
+    describe: fn(&Heap, Value) -> String,
+) -> Result<Datum, DatumError> {
+    let unit = Unit { describe: Some(describe), keeps_structures: true, ..Unit::default() };
+    export_by(heap, names, value, unit).map(|(datum, _)| datum)
+}
+
+fn export_by(heap: &Heap, names: &Names, value: Value, mut unit: Unit) -> Result<(Datum, usize), DatumError> {
     // Most values are integers, which nothing below has to be asked about.
     if let Some(integer) = value.as_fixnum() {
         return Ok((Datum::integer(integer, Span::default()), WORK_OF_ATOM));
@@ -93,7 +112,6 @@ pub(crate) fn export(
         let work = work_of(&datum);
         return Ok((datum, work));
     }
-    let mut unit = Unit { describe: Some(describe), ..Unit::default() };
     if names.is_symbol(heap, value) {
         return Ok((unit.atom_datum(heap, names, value, Span::default()), 1));
     }

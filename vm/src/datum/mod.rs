@@ -36,7 +36,9 @@ use crate::value::Value;
 
 pub use border::Atom;
 use border::work_of;
-pub(crate) use border::{WORK_OF_ATOM, atom_of, export, import, import_all, number_of, value_of_atom};
+pub(crate) use border::{
+    WORK_OF_ATOM, atom_of, export, export_structures, import, import_all, number_of, value_of_atom,
+};
 use environment::Environments;
 use parts::{are_parts, datum_with};
 pub(crate) use walk::DatumWalk;
@@ -99,6 +101,8 @@ pub(crate) struct Unit {
     /// Describes objects that no datum stands for, if the data are for the embedder, which gets its own
     /// objects back.
     describe: Option<fn(&Heap, Value) -> String>,
+    /// Whether structures are lists of their slots, as a text for another version of the machine has them.
+    keeps_structures: bool,
     /// Whether the data come from the host, and no object has to be led back to its datum: then only nodes
     /// that may occur twice are remembered, and a symbol denotes the one that its name has in its package,
     /// which may be inherited.

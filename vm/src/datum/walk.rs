@@ -2,15 +2,19 @@
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
 use esl_heap::array::{ArrayElements, vector_elements};
 
 use super::{DatumError, MAX_NODES, NODE_BYTES, Unit, packed, table, work_of};
 use crate::heap::layout::Array;
 use crate::heap::{Heap, Kind};
+use crate::names::class;
 use crate::names::load::integer_of;
 use crate::names::{GivenSet, Names, RootMap};
 use crate::value::Value;
 
+/// Name of the list that stands for a structure in a text for another version of the machine.
+const KEPT_STRUCTURE: &str = "%KEPT-STRUCTURE";
 /// Circular literals in one form, at most.
 const MAX_CIRCULAR: usize = 64;
 
@@ -156,6 +160,7 @@ impl DatumWalk {
                         unit.describe?;
                         vector_parts(heap, object)
                             .or_else(|| table::entries_of(heap, object).map(ObjectParts::Entries))
+                            .or_else(|| unit.keeps_structures.then(|| structure_parts(heap, object))?)
                     });
                     let Some(parts) = parts else {
                         self.made.push(unit.atom_datum(heap, names, object, span));
@@ -187,6 +192,9 @@ impl DatumWalk {
                         let cdr = self.made.pop().unwrap_or_else(|| Datum::nil(span));
                         let car = self.made.pop().unwrap_or_else(|| Datum::nil(span));
                         Datum::cons(car, cdr, span)
+                    } else if heap.kind(object) == Some(Kind::Structure) {
+                        let parts = self.made.split_off(self.made.len() - count);
+                        structure_datum(unit, heap, names, object, parts, span)
                     } else {
                         let parts = self.made.split_off(self.made.len() - count);
                         unit.compound(heap, object, parts, span)
@@ -276,6 +284,40 @@ fn vector_parts(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
         ArrayElements::Values(items) => Some(ObjectParts::Items(None, items)),
         _ => None,
     }
+}
+
+/// The slots of a structure of a program; `None` for an instance, and for the library's own.
+fn structure_parts(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
+    let data = class::class_slot(heap, class_of(heap, object)?, class::slot::DATA);
+    let tag = heap.symbol(*heap.vector(data)?.first()?)?;
+    let is_of_program = heap.string_text(tag.name).as_deref() == Some("STRUCTURE");
+    heap.structure_slots(object).filter(|_| is_of_program).map(|slots| ObjectParts::Items(None, slots))
+}
+
+/// Returns the class by which the slots of a structure are named.
+fn class_of(heap: &Heap, object: Value) -> Option<Value> {
+    if heap.is_instance(object) { None } else { heap.structure_class(heap.structure_whole(object)) }
+}
+
+/// Returns the list that stands for a structure with these slots.
+fn structure_datum(
+    unit: &mut Unit,
+    heap: &Heap,
+    names: &Names,
+    object: Value,
+    parts: Vec<Datum>,
+    span: Span,
+) -> Datum {
+    let class = class_of(heap, object).unwrap_or(Value::NIL);
+    let mut items = vec![Datum::symbol(Symbol::esl(KEPT_STRUCTURE), span)];
+    items.push(unit.atom_datum(heap, names, class::name_of(heap, class), span));
+    let mut rest = class::class_slot(heap, class, class::slot::SLOTS);
+    for part in parts {
+        let Some(pair) = heap.as_cons(rest) else { break };
+        rest = pair.cdr;
+        items.extend([unit.atom_datum(heap, names, pair.car, span), part]);
+    }
+    Datum::list(items, span)
 }
 
 /// Pushes visits onto `steps`, the first part on top.

@@ -1,7 +1,10 @@
 //! The facts of a run and its variables of `defdurable`, for another version of the machine.
 //!
 //! Both are plain data, whose text any version reads: numbers, characters, strings, symbols of packages, and
-//! pairs, vectors and hash tables of them. Nothing in the machine changes.
+//! pairs, vectors, hash tables and structures of them. Nothing in the machine changes.
+//!
+//! A run that has begun from such a text may not have defined all of its variables and structures yet: what
+//! waits for them is kept again.
 
 use std::collections::BTreeMap;
 
@@ -19,6 +22,10 @@ use crate::vm::Vm;
 
 /// Most parts of a value.
 const PARTS: usize = 1_000_000;
+/// The variable whose value are those of variables that are not defined yet: pairs of a name and a value.
+const WAITING_VARIABLES: &str = "*%KEPT*";
+/// The variable whose value are the facts whose structures are not defined yet.
+const WAITING_FACTS: &str = "*%KEPT-FACTS*";
 /// Name of the list that stands for a hash table: keys, each followed by its value.
 const TABLE: &str = "%KEPT-TABLE";
 
@@ -61,17 +68,13 @@ impl Vm {
     /// Returns the facts of the run and the variables of `defdurable`, while no task runs.
     pub fn kept_data(&self) -> KeptData {
         let mut kept = KeptData::default();
-        let listed = self.names.find(&Symbol::esl("*%DURABLE-VARIABLES*"));
-        let mut rest =
-            listed.and_then(|listed| self.heap.symbol(listed)).map_or(Value::NIL, |cell| cell.value);
-        while let Some(pair) = self.heap.as_cons(rest) {
-            rest = pair.cdr;
-            let (Some(name), Some(cell)) =
-                (self.names.name_of(&self.heap, pair.car), self.heap.symbol(pair.car))
-            else {
-                continue;
-            };
-            match self.plain_value(cell.value) {
+        let cell = |name: Value| self.heap.symbol(name).map(|cell| (name, cell.value));
+        let defined = self.listed_in("*%DURABLE-VARIABLES*").into_iter().filter_map(cell);
+        let waiting = self.listed_in(WAITING_VARIABLES);
+        let waiting = waiting.into_iter().filter_map(|entry| self.heap.as_cons(entry));
+        for (name, value) in defined.chain(waiting.map(|entry| (entry.car, entry.cdr))) {
+            let Some(name) = self.names.name_of(&self.heap, name) else { continue };
+            match self.plain_value(value) {
                 Ok(value) => kept.variables.push((name, value)),
                 Err(NotPlain(part)) => kept.left_out.push(format!("variable {name}: it has {part}")),
             }
@@ -91,6 +94,8 @@ impl Vm {
                 }
             }
         });
+        let waiting = self.listed_in(WAITING_FACTS);
+        kept.facts.extend(waiting.into_iter().filter_map(|fact| self.plain_value(fact).ok()));
         for (name, (count, part)) in without {
             let noun = if count == 1 { "fact" } else { "facts" };
             kept.left_out.push(format!("{count} {noun} {name}: with {part}"));
@@ -98,14 +103,27 @@ impl Vm {
         kept
     }
 
+    /// Returns the items of the list that is the value of a variable of the library.
+    fn listed_in(&self, variable: &str) -> Vec<Value> {
+        let symbol = self.names.find(&Symbol::esl(variable));
+        let mut rest =
+            symbol.and_then(|symbol| self.heap.symbol(symbol)).map_or(Value::NIL, |cell| cell.value);
+        let mut items = Vec::new();
+        while let Some(pair) = self.heap.as_cons(rest) {
+            items.push(pair.car);
+            rest = pair.cdr;
+        }
+        items
+    }
+
     /// Returns a value as plain data, or in words what keeps it from that.
     fn plain_value(&self, value: Value) -> Result<Datum, NotPlain> {
         if value == Value::UNBOUND {
             return Err(NotPlain::of("no value"));
         }
-        let datum = datum::export(&self.heap, &self.names, value, describe)
+        let datum = datum::export_structures(&self.heap, &self.names, value, describe)
             .map_err(|_| NotPlain::of("too many parts, or itself as a part"))?;
-        plain(&datum.0)
+        plain(&datum)
     }
 
     /// Returns a term of the database as plain data, or in words what keeps it from that.
@@ -143,7 +161,8 @@ impl Vm {
                         steps.extend(parts);
                         continue;
                     }
-                    TermContents::Object => return Err(NotPlain::of("an object")),
+                    TermContents::Object(object) => self.plain_value(object)?,
+                    TermContents::Other => return Err(NotPlain::of("an object")),
                 },
                 step => join(&step, &mut made).ok_or_else(|| NotPlain::of("an object"))?,
             };
