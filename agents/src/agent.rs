@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use esl::program::{self, Program};
-use esl_durable::{DurableError, DurableOptions, DurableRun, RunRest};
+use esl_durable::{DurableError, DurableOptions, DurableRun, KeptFacts, RunRest};
 use esl_host::{Host, Incoming, RealHost};
 use esl_replay::RunSetup;
 use esl_vm::run::RunOutcome;
@@ -13,9 +13,27 @@ use esl_vm::vm::{Tier, Vm};
 
 use super::error::AgentError;
 use super::folder::{agent_folder, read_arguments, write_arguments};
-use super::host::HostTable;
+use super::host::{AwakeAgent, HostTable};
 use super::mailbox::AgentMailbox;
+use super::origin::AgentOrigin;
 use super::outside::{AgentOutside, AwakeFlags};
+
+/// Things missing in the facts of an earlier run that are named.
+const LEFT_OUT: usize = 5;
+
+/// An agent that is to begin.
+#[derive(Clone, Copy)]
+pub struct NewAgent<'a> {
+    /// Its program.
+    pub program: &'a Program,
+    /// The arguments of the program.
+    pub arguments: &'a [String],
+    /// Its settings.
+    pub setup: &'a RunSetup,
+    /// Where the program is read again if the agent has to begin anew, with its facts, in another version of
+    /// the machine; without it, that is not possible.
+    pub origin: Option<&'a AgentOrigin>,
+}
 
 /// Begins an agent in the folder of a host, which need not be there. It takes its first turn when a host
 /// finds it, or is asked to start it. `prepare` gives its machine the functions of the outside, as that of
@@ -26,8 +44,7 @@ use super::outside::{AgentOutside, AwakeFlags};
 pub fn begin_agent(
     folder: &Path,
     name: &str,
-    (program, arguments): (&Program, &[String]),
-    setup: &RunSetup,
+    agent: NewAgent<'_>,
     prepare: impl FnOnce(&mut Vm),
 ) -> Result<(), AgentError> {
     let path = agent_folder(folder, name)?;
@@ -35,15 +52,48 @@ pub fn begin_agent(
     if run.found().is_some() {
         return Err(AgentError::Exists(name.into()));
     }
-    write_arguments(&path, arguments).map_err(|error| AgentError::Folder(path, error))?;
+    begin_run(&run, agent, prepare)?;
+    let noted = write_arguments(&path, agent.arguments);
+    let noted = noted.and_then(|()| agent.origin.map_or(Ok(()), |origin| origin.note(&path)));
+    noted.map_err(|error| AgentError::Folder(path, error))
+}
+
+/// Begins a run, which is put off before its first turn.
+fn begin_run(run: &DurableRun, agent: NewAgent<'_>, prepare: impl FnOnce(&mut Vm)) -> Result<(), AgentError> {
+    let NewAgent { program, arguments, setup, origin: _ } = agent;
     let host = Box::new(run.host(RealHost::new(arguments.to_vec())));
     let config = run.config(setup.config.clone());
     let mut machine = program::machine(config, host).map_err(DurableError::Machine)?;
     // That part of the library makes upgrades.
     program::load_operators(&mut machine).map_err(DurableError::Machine)?;
     prepare(&mut machine);
+    run.prepare(&mut machine)?;
     run.begin(program, setup, &machine)?;
-    run.put_off()?;
+    run.put_off(&machine)?;
+    Ok(())
+}
+
+/// Begins the run of an agent anew, with its facts, where another version of the machine has begun it.
+fn begin_anew(
+    shared: &HostTable,
+    name: &str,
+    path: &Path,
+    run: &DurableRun,
+    kept: &KeptFacts,
+) -> Result<(), AgentError> {
+    let origin = AgentOrigin::of(path).ok_or(AgentError::NoOrigin)?;
+    let (program, arguments, setup) = (origin.program()?, read_arguments(path), origin.setup());
+    let agent = NewAgent { program: &program, arguments: &arguments, setup: &setup, origin: None };
+    begin_run(run, agent, |machine| shared.prepare(machine))?;
+    shared.report(name, &format!(
+        "begun by another version of eslvm, and begins anew with {} facts and {} variables, as {:.1} s ago; its files \
+         are in {}",
+        kept.facts,
+        kept.variables,
+        kept.seconds,
+        kept.earlier.display()
+    ));
+    kept.left_out.iter().take(LEFT_OUT).for_each(|what| shared.report(name, &format!("missing: {what}")));
     Ok(())
 }
 
@@ -74,7 +124,12 @@ fn run_awake(
     flags: &Arc<AwakeFlags>,
 ) -> Result<RunRest, AgentError> {
     let path = agent_folder(&shared.folder, name)?;
-    let run = DurableRun::open(&path, shared.settings.durable)?;
+    let mut run = DurableRun::open_found(&path, shared.settings.durable)?;
+    if let Some(kept) = run.kept_facts() {
+        begin_anew(shared, name, &path, &run, kept)?;
+        drop(run);
+        run = DurableRun::open_found(&path, shared.settings.durable)?;
+    }
     run.warnings().iter().for_each(|warning| shared.report(name, warning));
     if let Some(status) = run.ended() {
         return Ok(RunRest::Ended(status));
@@ -98,8 +153,15 @@ fn run_awake(
     let outside = AgentOutside::new(host, mailbox.clone(), &run, shared.rule.clone(), flags.clone());
     let warned = (shared.clone(), name.clone());
     run.control().on_warning(move |warning| warned.0.report(&warned.1, warning));
-    shared.note_open(name, run.control(), inbox);
-    let (mut machine, main) = run.go_on(outside, |machine| shared.prepare(machine))?;
+    shared.note_open(
+        name,
+        AwakeAgent { control: run.control(), inbox, flags: flags.clone(), range: run.range() },
+    );
+    let made = run.go_on(outside, |machine| shared.prepare(machine));
+    if let (Err(DurableError::AddressesTaken), Some(range)) = (&made, run.range()) {
+        shared.make_room(name, range);
+    }
+    let (mut machine, main) = made?;
     machine.set_tier(Tier::Auto);
     let control = run.control();
     let outcome = loop {

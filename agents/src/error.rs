@@ -33,6 +33,10 @@ pub enum AgentError {
     Stopped,
     /// The agent has failed: the reason, in words.
     Failed(String),
+    /// The program of the agent cannot be read again: the file, and the reason, in words.
+    Program(PathBuf, String),
+    /// Nothing says where the program of the agent comes from, which has to begin anew.
+    NoOrigin,
     /// Too many messages wait for the agent.
     Full,
     /// The host is about to end, or the agent has ended before it took the message.
@@ -63,6 +67,13 @@ impl fmt::Display for AgentError {
             AgentError::Ended(status) => write!(f, "the agent has ended with status {status}"),
             AgentError::Stopped => f.write_str("the agent was stopped: start it first"),
             AgentError::Failed(reason) => write!(f, "the agent cannot go on: {reason}"),
+            AgentError::Program(file, reason) => {
+                write!(f, "its program {} cannot be begun anew: {reason}", file.display())
+            }
+            AgentError::NoOrigin => f.write_str(
+                "nothing says where its program comes from, so it cannot begin anew with its facts: go on with the \
+                 version that has begun it",
+            ),
             AgentError::Full => f.write_str("too many messages wait for the agent: send again later"),
             AgentError::Leaving => {
                 f.write_str("the agent has left its process before it took the message: send again")
@@ -88,6 +99,7 @@ impl AgentError {
         matches!(
             error,
             DurableError::InUse(_)
+                | DurableError::Inherited(_)
                 | DurableError::NotWritten(_)
                 | DurableError::AddressesTaken
                 | DurableError::MemoryRefused

@@ -47,6 +47,31 @@ pub(crate) fn socket_path(folder: &Path) -> PathBuf {
     folder.join("host.socket")
 }
 
+/// Returns a path by which a socket can be bound or reached, also if its own is too long for the system, as
+/// long as the second value is there.
+#[cfg(target_os = "linux")]
+pub(crate) fn reachable(socket: &Path) -> io::Result<(PathBuf, Option<fs::File>)> {
+    use std::os::fd::AsRawFd;
+
+    /// Most bytes of the path of a socket.
+    const SOCKET_PATH: usize = 100;
+    let (Some(folder), Some(name)) = (socket.parent(), socket.file_name()) else {
+        return Ok((socket.into(), None));
+    };
+    if socket.as_os_str().len() <= SOCKET_PATH {
+        return Ok((socket.into(), None));
+    }
+    let folder = fs::File::open(folder)?;
+    let path = Path::new("/proc/self/fd").join(folder.as_raw_fd().to_string()).join(name);
+    Ok((path, Some(folder)))
+}
+
+/// Returns the path of a socket, which other systems have no way around.
+#[cfg(not(target_os = "linux"))]
+pub(crate) fn reachable(socket: &Path) -> io::Result<(PathBuf, Option<fs::File>)> {
+    Ok((socket.into(), None))
+}
+
 /// Returns the arguments of the program of an agent.
 pub(crate) fn read_arguments(agent: &Path) -> Vec<String> {
     let text = fs::read_to_string(agent.join("arguments")).unwrap_or_default();
@@ -86,6 +111,23 @@ pub(crate) fn note_stopped(agent: &Path, is_stopped: bool) -> Result<(), AgentEr
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_socket_in_a_deep_folder_can_be_reached() {
+        let folder =
+            std::env::temp_dir().join(format!("esl-deep-{}-{}", std::process::id(), "x".repeat(150)));
+        fs::create_dir(&folder).expect("it is new");
+        let socket = socket_path(&folder);
+        let bound =
+            reachable(&socket).and_then(|(path, _folder)| std::os::unix::net::UnixListener::bind(path));
+        let listener = bound.expect("it can be bound");
+        assert!(socket.exists());
+        let reached =
+            reachable(&socket).and_then(|(path, _folder)| std::os::unix::net::UnixStream::connect(path));
+        assert!(reached.is_ok() && listener.accept().is_ok());
+        fs::remove_dir_all(&folder).expect("it can be removed");
+    }
 
     #[test]
     fn a_name_stays_in_the_folder() {

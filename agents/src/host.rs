@@ -10,53 +10,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use esl_durable::{DurableControl, DurableError, DurableOptions, RunFolder, RunRest};
-use esl_host::{Inbox, Rights};
+use esl_durable::{DurableControl, DurableError, RunFolder, RunRest};
+use esl_host::Inbox;
 use esl_vm::vm::Vm;
 
 use super::agent::run_agent;
 use super::error::AgentError;
 use super::folder::{agent_folder, agent_names, is_stopped, note_stopped};
 use super::mailbox::{AgentMailbox, Letter};
-use super::outside::SleepRule;
-
-/// Settings of a host.
-#[derive(Clone, Debug)]
-pub struct HostSettings {
-    /// Those of the runs.
-    pub durable: DurableOptions,
-    /// Rights of all agents.
-    pub rights: Rights,
-    /// Time that an agent waits before it is put to sleep.
-    pub sleep_after: Duration,
-    /// Agents that are awake at most, beside those that cannot sleep.
-    pub awake: usize,
-}
-
-impl Default for HostSettings {
-    /// No rights; sleep after ten seconds; 500 agents awake.
-    fn default() -> HostSettings {
-        HostSettings {
-            durable: DurableOptions::default(),
-            rights: Rights::none(),
-            sleep_after: Duration::from_secs(10),
-            awake: 500,
-        }
-    }
-}
-
-/// Receives something of an agent, with its name.
-pub type AgentListener<T> = Box<dyn Fn(&str, &T) + Send + Sync>;
-
-/// The part of a host that its embedder provides.
-pub struct HostSurroundings {
-    /// Gives the machine of an agent the functions of the outside.
-    pub prepare: Box<dyn Fn(&mut Vm) + Send + Sync>,
-    /// Receives the output of an agent, by its name.
-    pub print: AgentListener<[u8]>,
-    /// Receives reports about an agent, by its name.
-    pub report: AgentListener<str>,
-}
+use super::outside::{AwakeFlags, SleepRule};
+use super::settings::{HostSettings, HostSurroundings};
 
 /// How an agent stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -77,9 +40,12 @@ pub enum AgentStanding {
 }
 
 /// An agent that has a machine.
-struct AwakeAgent {
-    control: DurableControl,
-    inbox: Inbox,
+pub(crate) struct AwakeAgent {
+    pub(crate) control: DurableControl,
+    pub(crate) inbox: Inbox,
+    pub(crate) flags: Arc<AwakeFlags>,
+    /// Start of the addresses of its objects.
+    pub(crate) range: Option<usize>,
 }
 
 /// An agent, as the host knows it. There may be very many.
@@ -116,6 +82,8 @@ struct Agents {
     due: BTreeSet<(i64, Arc<str>)>,
     /// Those that wait for a place.
     ready: VecDeque<Arc<str>>,
+    /// Those whose addresses another one has that is awake.
+    blocked: Vec<Arc<str>>,
     awake: usize,
     tied: usize,
     is_stopping: bool,
@@ -176,6 +144,7 @@ impl HostTable {
     ) -> Result<Arc<HostTable>, AgentError> {
         settings.durable.hosted = Some(wall_clock());
         let lock = RunFolder::open(&folder)?;
+        lock.keep();
         let rule = SleepRule { after: settings.sleep_after, is_crowded: AtomicBool::new(false) };
         let mut agents = Agents::default();
         let names = agent_names(&folder).map_err(|error| AgentError::Folder(folder.clone(), error))?;
@@ -214,14 +183,26 @@ impl HostTable {
     }
 
     /// Notes that an agent has opened its run, so that it can be reached.
-    pub(crate) fn note_open(&self, name: &Arc<str>, control: DurableControl, inbox: Inbox) {
+    pub(crate) fn note_open(&self, name: &Arc<str>, awake: AwakeAgent) {
         let mut agents = self.agents();
         let is_stopping = agents.is_stopping;
         let Some(agent) = agents.known.get_mut(name) else { return };
         if is_stopping || agent.stops {
-            control.pause();
+            awake.control.pause();
         }
-        agent.awake = Some(Box::new(AwakeAgent { control, inbox }));
+        agent.awake = Some(Box::new(awake));
+    }
+
+    /// Has the agent that is awake at these addresses sleep when it waits, since another one needs them.
+    pub(crate) fn make_room(&self, name: &str, range: usize) {
+        let agents = self.agents();
+        for (other, agent) in &agents.known {
+            let Some(awake) = &agent.awake else { continue };
+            if &**other != name && awake.range == Some(range) {
+                awake.flags.is_in_the_way.store(true, Ordering::Relaxed);
+                awake.inbox.ring();
+            }
+        }
     }
 
     /// Notes that an agent cannot sleep, so that it keeps nobody else from a place.
@@ -236,7 +217,7 @@ impl HostTable {
     }
 
     /// Posts a letter to an agent, which is woken for it.
-    pub(crate) fn post(&self, name: &str, letter: Letter) {
+    pub(crate) fn post(self: &Arc<HostTable>, name: &str, letter: Letter) {
         let mut agents = self.agents();
         let is_stopping = agents.is_stopping;
         let Some((name, agent)) = agents.known.get_key_value(name) else {
@@ -261,6 +242,8 @@ impl HostTable {
         }
         if let AgentStanding::Asleep(_) = agent.standing {
             agents.set(&name, AgentStanding::Waiting);
+            // At once, without a turn of the thread that serves: on a busy processor that may take long.
+            self.give_places(&mut agents);
             self.changed.notify_all();
         }
     }
@@ -359,11 +342,7 @@ impl HostTable {
             {
                 agents.set(&name, AgentStanding::Waiting);
             }
-            while agents.awake - agents.tied < self.settings.awake
-                && let Some(name) = agents.ready.pop_front()
-            {
-                self.give_place(&mut agents, &name);
-            }
+            self.give_places(&mut agents);
             let is_crowded = !agents.ready.is_empty();
             if self.rule.is_crowded.swap(is_crowded, Ordering::Relaxed) != is_crowded && is_crowded {
                 let awake = agents.known.values().filter(|agent| !agent.is_tied);
@@ -377,6 +356,15 @@ impl HostTable {
         for agent in agents.known.values_mut() {
             let letters = agent.mailbox.take().map(|mailbox| mailbox.take()).unwrap_or_default();
             letters.into_iter().for_each(|letter| letter.answer(Err(AgentError::Leaving)));
+        }
+    }
+
+    /// Gives places to those that wait for one, as far as there are some.
+    fn give_places(self: &Arc<HostTable>, agents: &mut Agents) {
+        while agents.awake - agents.tied < self.settings.awake
+            && let Some(name) = agents.ready.pop_front()
+        {
+            self.give_place(agents, &name);
         }
     }
 
@@ -418,7 +406,18 @@ impl HostTable {
         let has_letters = agent.mailbox.as_ref().is_some_and(|mailbox| !mailbox.is_empty());
         let stops = agent.stops;
         agent.failures = if rest.is_err() { agent.failures.saturating_add(1) } else { 0 };
+        let failures = agent.failures;
         let mut report = None;
+        // Some of them may have the addresses now.
+        for other in std::mem::take(&mut agents.blocked) {
+            if agents
+                .known
+                .get(&other)
+                .is_some_and(|agent| matches!(agent.standing, AgentStanding::Failed(..)))
+            {
+                agents.set(&other, AgentStanding::Waiting);
+            }
+        }
         let standing = match rest {
             Ok(RunRest::Ended(status)) => AgentStanding::Ended(status),
             Ok(RunRest::Asleep(_)) if stops => AgentStanding::Stopped,
@@ -428,10 +427,14 @@ impl HostTable {
                 let text = error.to_string();
                 // A command may inspect the folder.
                 let is_in_use = matches!(error, AgentError::Run(DurableError::InUse(_)));
-                if !is_in_use || agent.failures == 1 {
+                let is_blocked = matches!(error, AgentError::Run(DurableError::AddressesTaken));
+                if is_blocked {
+                    agents.blocked.push(name.clone());
+                }
+                if !is_in_use && !is_blocked || failures == 1 && is_in_use || failures == LETTER_TRIES {
                     report = Some(text.clone());
                 }
-                let pause = RETRY.saturating_mul(1 << agent.failures.min(6)).as_nanos() as i64;
+                let pause = RETRY.saturating_mul(1 << failures.min(6)).as_nanos() as i64;
                 let again = error.may_pass().then(|| wall_clock().saturating_add(pause));
                 AgentStanding::Failed(text, again)
             }
@@ -439,9 +442,12 @@ impl HostTable {
         let refusal = match &standing {
             AgentStanding::Ended(status) => Some(AgentError::Ended(*status)),
             AgentStanding::Stopped => Some(AgentError::Stopped),
+            // The reason may pass, so letters wait for a while.
+            AgentStanding::Failed(_, Some(_)) if failures < LETTER_TRIES => None,
             AgentStanding::Failed(reason, _) => Some(AgentError::Failed(reason.clone())),
             _ => None,
         };
+        let Some(agent) = agents.known.get_mut(name) else { return };
         let mailbox = agent.mailbox.take_if(|_| refusal.is_some() || !has_letters);
         agents.tied -= usize::from(was_tied);
         agents.set(name, standing);
@@ -460,6 +466,9 @@ impl HostTable {
 
 /// Time after which an agent is tried again that could not go on, doubled with each failure.
 const RETRY: Duration = Duration::from_millis(250);
+
+/// Number of tries that have failed in a row, in about 16 seconds, after which letters are refused.
+const LETTER_TRIES: u8 = 6;
 
 /// Longest time between two looks at the clock.
 const LONGEST: Duration = Duration::from_secs(60);

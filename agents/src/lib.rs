@@ -10,13 +10,16 @@
 //! use std::time::Duration;
 //!
 //! use esl::program::{Source, compile};
-//! use esl_agents::{AgentsHost, HostClient, HostRequest, HostSettings, HostSurroundings, begin_agent};
+//! use esl_agents::{AgentsHost, HostClient, HostRequest, HostSettings, HostSurroundings};
+//! use esl_agents::{NewAgent, begin_agent};
 //! use esl_replay::RunSetup;
 //!
 //! let text = "(define-input order) (princ (wait-for-event order)) (exit 3)";
 //! let program = compile(&[Source::new("one.esl", text)]).program.expect("it compiles");
 //! let folder = std::env::temp_dir().join(format!("esl-agents-{}", std::process::id()));
-//! begin_agent(&folder, "one", (&program, &[]), &RunSetup::default(), |_machine| ())?;
+//! let setup = RunSetup::default();
+//! let agent = NewAgent { program: &program, arguments: &[], setup: &setup, origin: None };
+//! begin_agent(&folder, "one", agent, |_machine| ())?;
 //!
 //! let surroundings = HostSurroundings {
 //!     prepare: Box::new(|_machine| ()),
@@ -48,17 +51,21 @@ mod error;
 mod folder;
 mod host;
 mod mailbox;
+mod origin;
 mod outside;
 mod request;
 mod server;
+mod settings;
 
 use std::path::Path;
 use std::sync::Arc;
 
-pub use agent::begin_agent;
+pub use agent::{NewAgent, begin_agent};
 pub use error::AgentError;
-pub use host::{AgentListener, AgentStanding, HostSettings, HostSurroundings};
+pub use host::AgentStanding;
+pub use origin::AgentOrigin;
 pub use request::{HostClient, HostRequest};
+pub use settings::{AgentListener, HostSettings, HostSurroundings};
 
 use host::HostTable;
 use server::AgentsEntrance;

@@ -31,6 +31,8 @@ pub(crate) struct AwakeFlags {
     pub(crate) is_ending: AtomicBool,
     /// How often it could not be put to sleep, since it had ties to the process.
     pub(crate) refusals: AtomicU32,
+    /// Whether another agent waits for its addresses.
+    pub(crate) is_in_the_way: AtomicBool,
     under_way: Mutex<LettersUnderWay>,
 }
 
@@ -115,7 +117,8 @@ impl AgentOutside {
             return None;
         }
         let refusals = self.flags.refusals.load(Ordering::Relaxed);
-        let (patience, shortest) = match self.rule.is_crowded.load(Ordering::Relaxed) {
+        let is_in_the_way = self.flags.is_in_the_way.load(Ordering::Relaxed);
+        let (patience, shortest) = match is_in_the_way || self.rule.is_crowded.load(Ordering::Relaxed) {
             true if refusals == 0 => (Duration::ZERO, SHORTEST),
             _ => (self.rule.after.saturating_mul(1 << refusals.min(10)), self.rule.after),
         };

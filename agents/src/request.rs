@@ -56,18 +56,22 @@ impl HostRequest {
     pub(crate) fn read(line: &str) -> Result<HostRequest, AgentError> {
         let wrong = |reason: String| AgentError::Request(reason);
         let value: Value = serde_json::from_str(line).map_err(|error| wrong(error.to_string()))?;
-        let text = |key: &str| value.get(key).and_then(Value::as_str).map(String::from);
-        let need = |key: &str| text(key).ok_or_else(|| wrong(format!("expected a text for `{key}`")));
+        let text = |key: &str| match value.get(key) {
+            None | Some(Value::Null) => Ok(None),
+            Some(Value::String(text)) => Ok(Some(text.clone())),
+            Some(_) => Err(wrong(format!("expected a text for `{key}`"))),
+        };
+        let need = |key: &str| text(key)?.ok_or_else(|| wrong(format!("expected a text for `{key}`")));
         Ok(match &*need("do")? {
             "send" => HostRequest::Send {
                 agent: need("agent")?,
                 input: need("input")?,
-                data: text("data").unwrap_or_default(),
+                data: text("data")?.unwrap_or_default(),
             },
             "start" => HostRequest::Start(need("agent")?),
             "stop" => HostRequest::Stop(need("agent")?),
             "end" => HostRequest::End(need("agent")?),
-            "list" => HostRequest::List(text("agent")),
+            "list" => HostRequest::List(text("agent")?),
             other => {
                 return Err(wrong(format!(
                     "expected send, start, stop, end or list for `do`, found `{other}`"
@@ -109,7 +113,8 @@ impl HostClient {
     /// # Errors
     /// [`AgentError::NoHost`].
     pub fn connect(folder: &Path) -> Result<HostClient, AgentError> {
-        let stream = std::os::unix::net::UnixStream::connect(super::folder::socket_path(folder));
+        let socket = super::folder::reachable(&super::folder::socket_path(folder));
+        let stream = socket.and_then(|(path, _folder)| std::os::unix::net::UnixStream::connect(path));
         let stream = stream.map_err(|error| AgentError::NoHost(folder.into(), error))?;
         Ok(HostClient { reader: BufReader::new(stream) })
     }
@@ -142,7 +147,8 @@ pub(crate) fn read_line(from: &mut impl BufRead) -> io::Result<Option<String>> {
     if line.last() != Some(&b'\n') && count as u64 == LONGEST_REQUEST {
         return Err(io::Error::other("the line is too long"));
     }
-    String::from_utf8(line).map(Some).map_err(io::Error::other)
+    // A line that is not text becomes an invalid request, which is answered.
+    Ok(Some(String::from_utf8_lossy(&line).into_owned()))
 }
 
 #[cfg(test)]
@@ -165,7 +171,9 @@ mod tests {
             assert!(!line.contains('\n'));
             assert_eq!(HostRequest::read(&line).ok(), Some(request));
         }
-        for wrong in ["", "3", "{}", "{\"do\":\"fly\"}", "{\"do\":\"stop\"}", "{\"do\":\"stop\",\"agent\":3}"]
+        let list = "{\"do\":\"list\",\"agent\":3}";
+        for wrong in
+            ["", "3", "{}", "{\"do\":\"fly\"}", "{\"do\":\"stop\"}", "{\"do\":\"stop\",\"agent\":3}", list]
         {
             assert!(matches!(HostRequest::read(wrong), Err(AgentError::Request(_))), "{wrong}");
         }
@@ -188,5 +196,6 @@ mod tests {
         assert!(read_line(&mut endless).is_err());
         assert_eq!(read_line(&mut &b"a\nb"[..]).ok(), Some(Some("a\n".into())));
         assert_eq!(read_line(&mut &b""[..]).ok(), Some(None));
+        assert_eq!(read_line(&mut &b"\xff\n"[..]).ok(), Some(Some("\u{fffd}\n".into())));
     }
 }

@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use super::error::AgentError;
-use super::folder::socket_path;
+use super::folder::{reachable, socket_path};
 use super::host::{AgentStanding, HostTable};
 use super::mailbox::{Letter, LetterContents};
 use super::request::{HostRequest, read_data, read_line};
@@ -23,7 +23,7 @@ impl Drop for AgentsEntrance {
     fn drop(&mut self) {
         let path = socket_path(&self.shared.folder);
         // The thread that accepts looks up.
-        drop(UnixStream::connect(&path));
+        drop(reachable(&path).and_then(|(path, _folder)| UnixStream::connect(path)));
         drop(fs::remove_file(&path));
     }
 }
@@ -41,7 +41,7 @@ pub(crate) fn listen(shared: &Arc<HostTable>) -> Result<AgentsEntrance, AgentErr
         _ => {}
     }
     // The folder is closed to other users.
-    let listener = UnixListener::bind(&path).map_err(refused)?;
+    let listener = reachable(&path).and_then(|(path, _folder)| UnixListener::bind(path)).map_err(refused)?;
     let accepting = shared.clone();
     let thread =
         std::thread::Builder::new().name("agents".into()).spawn(move || accept(&listener, &accepting));
@@ -67,7 +67,7 @@ fn accept(listener: &UnixListener, shared: &Arc<HostTable>) {
 }
 
 /// Answers the requests of a connection, one after the other.
-fn serve(stream: UnixStream, shared: &HostTable) -> io::Result<()> {
+fn serve(stream: UnixStream, shared: &Arc<HostTable>) -> io::Result<()> {
     let mut writer = stream.try_clone()?;
     let mut reader = BufReader::new(stream);
     while let Some(line) = read_line(&mut reader)? {
@@ -78,7 +78,7 @@ fn serve(stream: UnixStream, shared: &HostTable) -> io::Result<()> {
     Ok(())
 }
 
-fn perform(request: HostRequest, shared: &HostTable) -> Result<Value, AgentError> {
+fn perform(request: HostRequest, shared: &Arc<HostTable>) -> Result<Value, AgentError> {
     match request {
         HostRequest::Send { agent, input, data } => {
             post(shared, &agent, LetterContents::Message { input, arguments: read_data(&data)? })?;
@@ -101,7 +101,7 @@ fn perform(request: HostRequest, shared: &HostTable) -> Result<Value, AgentError
 }
 
 /// Posts a letter, and waits for its answer.
-fn post(shared: &HostTable, agent: &str, contents: LetterContents) -> Result<(), AgentError> {
+fn post(shared: &Arc<HostTable>, agent: &str, contents: LetterContents) -> Result<(), AgentError> {
     let (letter, answer) = Letter::new(contents);
     shared.post(agent, letter);
     answer.recv().unwrap_or(Err(AgentError::Leaving))

@@ -71,6 +71,26 @@ pub unsafe extern "C" fn esl_durable_set_snapshots(
     }
 }
 
+/// Has a run of another version of the machine begin anew, with its facts and the variables of `defdurable`,
+/// as `--from-facts` does. A run of this version goes on.
+///
+/// # Safety
+/// As for `esl_durable_set_power`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn esl_durable_set_from_facts(
+    durable: *const esl_durable,
+    from_facts: bool,
+    failure: *mut *mut esl_failure,
+) -> esl_status {
+    // SAFETY: each pointer is null, or to what C holds and lends.
+    unsafe {
+        guarded(failure, || {
+            esl_durable::lock(durable)?.preparation()?.options.from_facts = from_facts;
+            Ok(())
+        })
+    }
+}
+
 /// Has a run whose program has changed make the new definitions before it goes on, as `--upgrade` does.
 ///
 /// # Safety

@@ -12,8 +12,9 @@ use esl_vm::vm::Vm;
 use super::log::JournalLog;
 use super::rest::RunRest;
 use super::resume::wall_clock;
+use super::settings::compare_settings;
 use super::upgrade::read_program;
-use super::{DurableError, DurableRun, compare_settings};
+use super::{DurableError, DurableRun};
 
 /// The journal of a run that goes on, for hosts that answer for the safety of messages.
 #[derive(Clone)]
@@ -79,9 +80,10 @@ impl DurableRun {
     ///
     /// # Errors
     /// [`DurableError`].
-    pub fn put_off(&self) -> Result<(), DurableError> {
+    pub fn put_off(&self, machine: &Vm) -> Result<(), DurableError> {
         self.note_sleep(0);
         self.log.finish();
+        self.keep_facts_asleep(machine);
         self.check()
     }
 
@@ -100,11 +102,17 @@ impl DurableRun {
         let wall = self.note_sleep(time);
         self.log.leave();
         self.taker.finish();
+        self.keep_facts_asleep(machine);
         self.check()?;
         let until = due.map(|due| wall.saturating_add_unsigned(due.saturating_sub(time)));
         let rest = RunRest::Asleep(until);
         self.note_rest(rest);
         Ok(rest)
+    }
+
+    /// Returns the start of the addresses of the run's objects, unless it is never copied.
+    pub fn range(&self) -> Option<usize> {
+        self.range
     }
 
     /// Notes that the run sleeps from this time of its clock on. Returns the time of day.

@@ -215,6 +215,11 @@ impl Disk for RealDisk {
 
     fn begin_generation(&mut self, number: u64, contents: &[u8]) -> io::Result<()> {
         let mut next = RealDisk::new(journal_file(self.folder(), number));
+        // A file of this name would be another run's, such as that of a copy that was not completed.
+        match std::fs::remove_file(snapshot_file(self.folder(), number)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
         next.create(contents)?;
         *self = next;
         Ok(())

@@ -11,7 +11,7 @@ use esl_replay::RunSetup;
 use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Tier, Vm};
 
-use super::{DurableControl, DurableError, DurableOptions, DurableRun};
+use super::{DurableControl, DurableError, DurableOptions, DurableRun, KeptFacts};
 
 /// Settings of an engine whose run is durable.
 #[derive(Default)]
@@ -120,6 +120,12 @@ impl DurableEngine {
     /// Returns warnings about the files.
     pub fn warnings(&self) -> &[String] {
         self.run.warnings()
+    }
+
+    /// Returns the facts from which the run begins anew, if another version of the machine has begun it and
+    /// [`DurableOptions::from_facts`] is set.
+    pub fn kept_facts(&self) -> Option<&KeptFacts> {
+        self.run.kept_facts()
     }
 
     /// Runs the program until it ends, or is paused. Waits while all tasks wait.

@@ -18,6 +18,8 @@ pub enum DurableError {
     Folder(PathBuf, io::Error),
     /// Another process has the folder.
     InUse(PathBuf),
+    /// A process that the last process of the run has started has the folder still.
+    Inherited(PathBuf),
     /// The folder or a file in it belongs to another user, or other users may write or read it.
     NotPrivate(PathBuf),
     /// There is no durable run in the folder.
@@ -44,6 +46,9 @@ pub enum DurableError {
     NotUpgraded(String),
     /// It was begun with other settings: their names.
     OtherSettings(&'static str),
+    /// It was begun with other limits, another slice or another seed: their names and values, as options of
+    /// the command.
+    OtherLimits(String),
     /// The run does not take the course of its journal.
     Diverged(String),
     /// The journal cannot be written, so no effect may leave.
@@ -64,6 +69,12 @@ impl fmt::Display for DurableError {
             DurableError::InUse(path) => {
                 write!(f, "{} is in use by another process: a run has one at a time", path.display())
             }
+            DurableError::Inherited(path) => write!(
+                f,
+                "{} is in use by a process that the run's last process has started as a copy of itself, by a fork: \
+                 it has to end first",
+                path.display()
+            ),
             DurableError::NotPrivate(path) => write!(
                 f,
                 "{} must belong to you, without access for others, since its contents are executed; type \
@@ -113,6 +124,9 @@ impl fmt::Display for DurableError {
             }
             DurableError::OtherSettings(which) => {
                 write!(f, "the run was begun with {which}; repeat the command by which it was begun")
+            }
+            DurableError::OtherLimits(options) => {
+                write!(f, "the run was begun with other limits, slice or seed: give it {options}")
             }
             DurableError::Diverged(text) => {
                 write!(f, "the run does not take the course of its journal: {text}")

@@ -7,7 +7,7 @@
 //! ```text
 //! facts.esl     the text
 //! begin.esl     the same file while a run is begun anew from it: what was done so far is done again
-//! earlier/      the files of the run before
+//! earlier/      the files of the run before, with that text
 //! ```
 //!
 //! Guarantees: each file is there whole or not at all. At each moment the folder has the run as it was, the
@@ -199,7 +199,7 @@ pub(crate) fn find(path: &Path, is_wanted: bool) -> Result<FoundOrKept, DurableE
         && run.journal.recorded.beginning.kept.as_ref().is_some_and(|of_run| of_run.ends_with(&kept.text))
     {
         // Only this step was missing.
-        fs::remove_file(&begun).map_err(in_folder)?;
+        fs::rename(&begun, text_file(&earlier(path))).map_err(in_folder)?;
         return Ok((found?, None));
     }
     move_away(path).map_err(in_folder)?;
@@ -253,8 +253,9 @@ impl DurableRun {
     /// Notes that the run has begun with the facts, so that it goes on by its journal.
     pub(crate) fn end_beginning(&self) -> Result<(), DurableError> {
         let (Some(folder), Some(_)) = (&self.folder, &self.kept) else { return Ok(()) };
-        let removed = fs::remove_file(begun_file(folder.path()));
-        removed.map_err(|error| DurableError::Folder(folder.path().into(), error))
+        // With the files of the run before, so that one can begin again from there.
+        let moved = fs::rename(begun_file(folder.path()), text_file(&earlier(folder.path())));
+        moved.map_err(|error| DurableError::Folder(folder.path().into(), error))
     }
 
     /// Writes the facts of the run at a pause, and warns of missing things.
@@ -271,6 +272,14 @@ impl DurableRun {
                 }
             }
             Err(error) => self.control.warn(&format!("the facts cannot be written as a text: {error}")),
+        }
+    }
+
+    /// Writes the facts of a run that sleeps. Missing things are reported at a pause.
+    pub(crate) fn keep_facts_asleep(&self, machine: &Vm) {
+        let Some(folder) = &self.folder else { return };
+        if let Err(error) = keep(folder.path(), machine, true, self.log.survives_loss_of_power()) {
+            self.control.warn(&format!("the facts cannot be written as a text: {error}"));
         }
     }
 

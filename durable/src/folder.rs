@@ -1,7 +1,9 @@
 //! The folder of a durable run: its owner, and its lock, which one process holds at a time.
 
 use std::fs::{self, File, OpenOptions};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 #[cfg(unix)]
 use std::time::Duration;
 
@@ -21,8 +23,20 @@ const DOUBT: Duration = Duration::from_millis(300);
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
+    /// Whether it was made here, and is removed again unless it gets contents.
+    is_new: AtomicBool,
     /// Locked until it is closed, which the system does when the process ends.
     _lock: File,
+}
+
+impl Drop for RunFolder {
+    fn drop(&mut self) {
+        if *self.is_new.get_mut() {
+            // A process that waits for the lock notices that its file is not that of the folder any more.
+            drop(fs::remove_file(self.path.join(LOCK)));
+            drop(fs::remove_dir(&self.path));
+        }
+    }
 }
 
 impl RunFolder {
@@ -31,12 +45,33 @@ impl RunFolder {
     /// # Errors
     /// [`DurableError`].
     pub fn open(path: &Path) -> Result<RunFolder, DurableError> {
+        let folder_error = |error| DurableError::Folder(path.into(), error);
+        if path.as_os_str().is_empty() {
+            return Err(folder_error(io::ErrorKind::InvalidInput.into()));
+        }
         let mut builder = fs::DirBuilder::new();
-        builder.recursive(true);
         #[cfg(unix)]
         std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-        builder.create(path).map_err(|error| DurableError::Folder(path.into(), error))?;
-        RunFolder::take(path)
+        if let Some(parent) = path.parent() {
+            builder.recursive(true).create(parent).map_err(folder_error)?;
+        }
+        let is_new = match builder.recursive(false).create(path) {
+            Ok(()) => true,
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && path.is_dir() => false,
+            Err(error) => return Err(folder_error(error)),
+        };
+        let taken = RunFolder::take(path);
+        match &taken {
+            Ok(folder) => folder.is_new.store(is_new, Ordering::Relaxed),
+            Err(_) if is_new => drop(fs::remove_dir(path)),
+            Err(_) => {}
+        }
+        taken
+    }
+
+    /// Keeps a folder that was made here.
+    pub fn keep(&self) {
+        self.is_new.store(false, Ordering::Relaxed);
     }
 
     /// Takes a folder that is there for this process.
@@ -50,17 +85,35 @@ impl RunFolder {
         options.read(true).write(true).create(true).truncate(false);
         #[cfg(unix)]
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-        let lock =
-            options.open(&lock_path).map_err(|error| DurableError::Folder(lock_path.clone(), error))?;
-        #[cfg(unix)]
-        take_lock(&lock, path)?;
-        Ok(RunFolder { path: path.into(), _lock: lock })
+        let lock = loop {
+            let lock = options.open(&lock_path);
+            let lock = lock.map_err(|error| DurableError::Folder(lock_path.clone(), error))?;
+            #[cfg(unix)]
+            take_lock(&lock, path)?;
+            if is_at(&lock, &lock_path) {
+                break lock;
+            }
+        };
+        Ok(RunFolder { path: path.into(), is_new: AtomicBool::new(false), _lock: lock })
     }
 
     /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
+}
+
+/// Returns whether a file is still the one at a place: the folder may have been removed meanwhile.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |metadata: std::io::Result<fs::Metadata>| metadata.map(|one| (one.dev(), one.ino())).ok();
+    identity(file.metadata()) == identity(fs::metadata(path))
+}
+
+#[cfg(not(unix))]
+fn is_at(_file: &File, _path: &Path) -> bool {
+    true
 }
 
 /// Locks the folder, and notes the number of this process in the file. A fork of a process that was killed
@@ -82,7 +135,8 @@ fn take_lock(lock: &File, path: &Path) -> Result<(), DurableError> {
             {
                 std::thread::sleep(Duration::from_millis(5));
             }
-            Err(Errno::WOULDBLOCK) => return Err(DurableError::InUse(path.into())),
+            Err(Errno::WOULDBLOCK) if is_holder_alive(lock) => return Err(DurableError::InUse(path.into())),
+            Err(Errno::WOULDBLOCK) => return Err(DurableError::Inherited(path.into())),
             Err(error) => return Err(folder_error(error.into())),
         }
     }

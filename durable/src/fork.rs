@@ -60,6 +60,7 @@ pub fn fork(path: &Path, copy: &Path, back: Duration) -> Result<RunFork, Durable
     if !generations::numbers(target.path()).map_err(in_copy)?.is_empty() {
         return Err(DurableError::HasRun(copy.into()));
     }
+    target.keep();
     for number in found.oldest..=last {
         let snapshot = snapshot_file(folder.path(), number);
         if number > 0 && snapshot.exists() {

@@ -42,6 +42,7 @@ mod disk;
 mod engine;
 mod error;
 mod facts;
+mod figures;
 mod file_effect;
 mod folder;
 mod fork;
@@ -55,6 +56,7 @@ mod look;
 mod rehearsal;
 mod rest;
 mod resume;
+mod settings;
 mod snapshots;
 mod standing;
 mod upgrade;
@@ -62,7 +64,6 @@ mod upgrade;
 use std::path::Path;
 
 use esl::program::Program;
-use esl_bytecode::module::Module;
 use esl_host::Host;
 use esl_replay::{
     Beginning, JournalLife, JournalUpgrade, JournalWriter, OpenCall, RecordedError, RunJournal, RunSetup,
@@ -78,10 +79,10 @@ pub use disk::{Disk, RealDisk, SnapshotWriting};
 pub use engine::{DurableEnding, DurableEngine, DurableSettings};
 pub use error::DurableError;
 pub use facts::KeptFacts;
+pub use figures::LogFigures;
 pub use folder::RunFolder;
 pub use fork::{RunFork, fork};
 pub use host::DurableHost;
-pub use log::LogFigures;
 pub use look::{DurableState, RunPatch, look};
 pub use rehearsal::{Rehearsal, rehearse};
 pub use rest::RunRest;
@@ -92,6 +93,7 @@ use generations::FoundJournals;
 use lasting::LastingCalls;
 use log::JournalLog;
 use resume::{Resumption, chance, wall_clock};
+use settings::compare;
 use snapshots::SnapshotTaker;
 use standing::Standing;
 use upgrade::Upgrade;
@@ -173,12 +175,26 @@ impl DurableRun {
     /// # Errors
     /// [`DurableError`].
     pub fn open(path: &Path, options: DurableOptions) -> Result<DurableRun, DurableError> {
-        let folder = RunFolder::open(path)?;
+        DurableRun::open_in(RunFolder::open(path)?, options)
+    }
+
+    /// Takes the folder of a run that is there.
+    ///
+    /// # Errors
+    /// [`DurableError`]; [`DurableError::NoRun`] if there is no folder.
+    pub fn open_found(path: &Path, options: DurableOptions) -> Result<DurableRun, DurableError> {
+        DurableRun::open_in(RunFolder::take(path)?, options)
+    }
+
+    fn open_in(folder: RunFolder, options: DurableOptions) -> Result<DurableRun, DurableError> {
         let (found, kept) = facts::find(folder.path(), options.from_facts)?;
         let last = found.as_ref().map_or(0, |found| found.last);
         let disk = with_kill(RealDisk::new(generations::journal_file(folder.path(), last)));
         let mut run = DurableRun::with(disk, found, options)?;
         run.taker.keep_facts_in(folder.path());
+        if run.found.is_some() || kept.is_some() {
+            folder.keep();
+        }
         (run.folder, run.kept) = (Some(folder), kept);
         Ok(run)
     }
@@ -191,7 +207,7 @@ impl DurableRun {
         if !path.is_dir() {
             return Err(DurableError::NoRun(path.into()));
         }
-        let run = DurableRun::open(path, DurableOptions::default())?;
+        let run = DurableRun::open_found(path, DurableOptions::default())?;
         if run.found.is_some() { Ok(run) } else { Err(DurableError::NoRun(path.into())) }
     }
 
@@ -372,6 +388,9 @@ impl DurableRun {
                 beginning.kept = self.kept.as_ref().map(KeptFacts::for_beginning);
                 self.log.create(&beginning, life);
                 self.check()?;
+                if let Some(folder) = &self.folder {
+                    folder.keep();
+                }
                 self.end_beginning()
             }
         }
@@ -433,39 +452,6 @@ impl DurableRun {
     /// Returns figures of the journal.
     pub fn figures(&self) -> LogFigures {
         self.log.figures()
-    }
-}
-
-/// Returns whether two programs are one. The name of its file as it is typed may be another one.
-fn is_same_program(before: &Program, given: &Program) -> bool {
-    let renamed = Module { sources: before.module().sources.clone(), ..given.module().clone() };
-    renamed == *before.module()
-}
-
-/// Refuses to go on with a run that has begun with another program or other settings.
-fn compare(found: &Beginning, given: &Beginning, program: &Program) -> Result<(), DurableError> {
-    if found.program != given.program {
-        let before = Program::from_bytes(&found.program)
-            .map_err(|_| DurableError::Journal(RecordedError::OtherMachine))?;
-        if !is_same_program(&before, program) {
-            let changes = changes::changes(&before, program, &Default::default());
-            return Err(DurableError::OtherProgram(Box::new(changes)));
-        }
-    }
-    compare_settings(found, given)
-}
-
-/// Refuses to go on with a run that has begun with other settings.
-fn compare_settings(found: &Beginning, given: &Beginning) -> Result<(), DurableError> {
-    let settings = [
-        (found.config == given.config, "other limits, slice or seed"),
-        (found.traces == given.traces, "other traces"),
-        (found.functions == given.functions, "other functions of the host"),
-        (found.has_operators == given.has_operators, "other options for operators"),
-    ];
-    match settings.iter().find(|(is_equal, _)| !is_equal) {
-        Some((_, which)) => Err(DurableError::OtherSettings(which)),
-        None => Ok(()),
     }
 }
 

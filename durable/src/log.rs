@@ -18,12 +18,14 @@ use esl_vm::heap::HeapMemory;
 use super::disk::{Disk, SnapshotWriting};
 use super::lasting::REPEATED;
 use super::standing::Standing;
-use super::{Durability, DurableError};
+use super::{Durability, DurableError, LogFigures};
 
 /// Bytes of records that wait at most.
 const BUFFER: usize = 64 << 10;
 /// Bytes that an operation can save at most.
 const MOST_SAVED: usize = 64 << 20;
+/// Bytes of states of operations after which the machine is rung, so that it can take a snapshot.
+const UNSEEN: u64 = 64 << 10;
 
 /// The state of a journal that is being written.
 struct LogWriting {
@@ -49,20 +51,9 @@ struct LogWriting {
     error: Option<DurableError>,
     /// Rung when there is an error, so that the machine comes back.
     inbox: Option<Inbox>,
+    /// Bytes of states of operations since the machine was rung because of them.
+    unseen: u64,
     figures: LogFigures,
-}
-
-/// Figures of a journal that is being written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LogFigures {
-    /// Bytes of the file.
-    pub bytes: u64,
-    /// Writes to it by this process.
-    pub writes: u64,
-    /// Syncs of it by this process.
-    pub syncs: u64,
-    /// Effects of this process.
-    pub effects: u64,
 }
 
 /// A journal that is being written. Clones write the same one.
@@ -92,6 +83,7 @@ impl JournalLog {
             begun_at: 0,
             error: None,
             inbox: None,
+            unseen: 0,
             figures: LogFigures::default(),
         })))
     }
@@ -291,6 +283,11 @@ impl JournalLog {
         !self.lock().standing.open.is_empty()
     }
 
+    /// Returns whether the run survives loss of power.
+    pub(crate) fn survives_loss_of_power(&self) -> bool {
+        self.lock().durability == Durability::Power
+    }
+
     /// Returns the number of the generation that is written, and the length of its journal.
     pub(crate) fn place(&self) -> (u64, u64) {
         let writing = self.lock();
@@ -388,6 +385,12 @@ impl LogWriting {
         }
         let bytes = journal_saved(operation, state, self.mark());
         self.append(&bytes);
+        // A machine that waits for the operation alone would take no snapshot, and the journal would grow.
+        self.unseen += bytes.len() as u64;
+        if self.unseen > UNSEEN {
+            self.unseen = 0;
+            self.ring();
+        }
         if self.durability == Durability::Power {
             self.sync();
         }
@@ -403,6 +406,10 @@ impl LogWriting {
 
     fn fail(&mut self, error: DurableError) {
         self.error.get_or_insert(error);
+        self.ring();
+    }
+
+    fn ring(&self) {
         if let Some(inbox) = &self.inbox {
             inbox.ring();
         }

@@ -172,7 +172,7 @@ impl World {
                     for incoming in contents {
                         match incoming {
                             // It has the machine wait for what comes later.
-                            Incoming::SenderCame => {
+                            Incoming::SenderCame | Incoming::Hosted => {
                                 inner = inner.with_arrival(now, incoming.clone());
                                 continue;
                             }

@@ -190,7 +190,7 @@ impl DurableRun {
     ) -> Result<Option<ProgramChanges>, DurableError> {
         let Some(found) = &self.found else { return Ok(None) };
         let current = read_program(found.current())?;
-        let is_same = super::is_same_program(&current, given);
+        let is_same = super::settings::is_same_program(&current, given);
         Ok((!is_same).then(|| changes(&current, given, sources)))
     }
 

@@ -4,14 +4,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use esl::host::{HostFailure, HostHandle, HostObject, HostRows, Inbox, RealHost};
 use esl::program::{self, Source, compile};
 use esl_durable::{
-    Disk, Downtime, DurableEnding, DurableEngine, DurableError, DurableOptions, DurableRun, DurableSettings,
-    Rehearsal, SnapshotEvery, rehearse,
+    Disk, Downtime, DurableControl, DurableEnding, DurableEngine, DurableError, DurableOptions, DurableRun,
+    DurableSettings, Rehearsal, SnapshotEvery, rehearse,
 };
 use esl_host::{CallEffect, HostFunction, HostOperation};
 use esl_replay::RunSetup;
@@ -263,4 +263,66 @@ fn a_state_that_cannot_be_kept_is_refused() {
     assert_eq!(saving_life(&disk, false, &saved).expect("it goes on"), 0);
     let saved = saved.lock().unwrap_or_else(PoisonError::into_inner);
     assert_eq!(*saved, [(None, true, false), (Some(b"one".to_vec()), true, true)]);
+}
+
+/// A disk on which each snapshot is asked for in vain, and pauses the run meanwhile.
+struct PausingDisk(SmallDisk, Arc<OnceLock<DurableControl>>, Arc<AtomicI64>);
+
+impl Disk for PausingDisk {
+    fn read(&mut self) -> io::Result<Option<Vec<u8>>> {
+        self.0.read()
+    }
+
+    fn create(&mut self, contents: &[u8]) -> io::Result<()> {
+        self.0.create(contents)
+    }
+
+    fn truncate(&mut self, length: u64) -> io::Result<()> {
+        self.0.truncate(length)
+    }
+
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.append(bytes)
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        self.0.sync()
+    }
+
+    fn begin_generation(&mut self, _number: u64, _contents: &[u8]) -> io::Result<()> {
+        self.2.fetch_add(1, Ordering::Relaxed);
+        self.1.get().map(DurableControl::pause);
+        Err(io::ErrorKind::StorageFull.into())
+    }
+
+    fn remove_generation(&mut self, _number: u64) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_pause_during_a_snapshot_and_a_long_operation_that_saves() {
+    let (control, asked) = (Arc::<OnceLock<DurableControl>>::default(), Arc::<AtomicI64>::default());
+    let disk = PausingDisk(SmallDisk::default(), control.clone(), asked.clone());
+    let options = DurableOptions { snapshots: SnapshotEvery::Bytes(100_000), ..DurableOptions::default() };
+    let run = DurableRun::on(Box::new(disk), options).expect("it is new");
+    control.set(run.control()).ok().expect("it was not set");
+    let host = RealHost::new(Vec::new()).with_elapsed(run.elapsed());
+    let config = run.config(Config::DEFAULT);
+    let mut machine = program::machine(config, Box::new(run.host(host))).expect("there is room");
+    // The program waits for the operation alone, which saves states for ever.
+    let hold = HostFunction::Operation(Box::new(move |operation: HostOperation| {
+        std::thread::spawn(move || while operation.save(&[7; 10_000]) && !operation.is_cancelled() {});
+    }));
+    machine.add_function_with("HOLD", hold, &[], CallEffect::Once);
+    let source = Source::new("hold.esl", "(esl::%define-host-function hold () \"Holds.\" t) (hold)");
+    let program = compile(&[source]).program.expect("it compiles");
+    run.begin(&program, &RunSetup::default(), &machine).expect("there is room");
+    program::begin(&mut machine, &program).expect("there is room");
+    run.take_snapshots(&mut machine);
+    machine.run(u64::MAX);
+    assert!(run.control().begin_end(), "it was paused");
+    run.pause(&machine).expect("there is room");
+    assert!((1..=2).contains(&asked.load(Ordering::Relaxed)));
 }

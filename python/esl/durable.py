@@ -82,6 +82,7 @@ class DurableEngine:
     :param downtime: "counts", or "stops": the program's clock has stood still between two processes
     :param snapshot_every: when the machine is stored: "60s", "64M", "never"
     :param upgrade: makes the definitions of another version of the program, if it has changed
+    :param from_facts: begins the run of another version of this package anew, with its facts and the variables of DEFDURABLE
 
     The other parameters are those of `Engine`; limits and seed are the same in each process.
     """
@@ -102,6 +103,7 @@ class DurableEngine:
         downtime: str = "counts",
         snapshot_every: Optional[str] = None,
         upgrade: bool = False,
+        from_facts: bool = False,
     ) -> None:
         if (path is None) == (text is None):
             raise TypeError("a durable run has its program in a file or as a text: name one of them")
@@ -109,7 +111,7 @@ class DurableEngine:
         self._path = path
         self._text = text
         self._settings = (clock, rights_of(allow), size_of(memory), seed, budget, output)
-        self._durable = (durability, downtime, snapshot_every, upgrade)
+        self._durable = (durability, downtime, snapshot_every, upgrade, from_facts)
         self._rows: list[tuple[str, str, str, Callable[..., Any], bool, bool]] = []
         self._run: Optional[_esl.DurableEngine] = None
         self._loop: Optional[asyncio.AbstractEventLoop] = None

@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 
 use crate::callback;
 use crate::engine::rights;
-use crate::failure::{busy, exception, of_error};
+use crate::failure::{exception, of_error};
 use crate::handle::Handle;
 use crate::output::{Output, screen};
 use crate::process::{Process, detached};
@@ -99,6 +99,7 @@ impl DurableEngine {
         downtime: &str,
         snapshots: Option<&str>,
         upgrades: bool,
+        from_facts: bool,
     ) -> PyResult<DurableEngine> {
         let choice = |what: &str, given: &str, choices: [&str; 2]| match choices {
             [first, _] if given == first => Ok(false),
@@ -115,7 +116,7 @@ impl DurableEngine {
         if let Some(function) = output {
             host = host.with_screen(screen(Output::new(Arc::new(function))));
         }
-        let mut durable = DurableOptions::default();
+        let mut durable = DurableOptions { from_facts, ..DurableOptions::default() };
         if choice("durability", survives, ["process", "power"])? {
             durable.durability = Durability::Power;
         }
@@ -150,7 +151,11 @@ impl DurableEngine {
 
     /// Runs the program until it ends or is paused. Returns its exit status; nothing if it is paused.
     fn run(&self, py: Python<'_>) -> PyResult<Option<u8>> {
-        let engine = self.lock()?.take().ok_or_else(busy)?;
+        let engine = self.lock()?.take().ok_or_else(|| {
+            PyRuntimeError::new_err(
+                "the run is under way or over in this process: make another engine of its folder",
+            )
+        })?;
         let (done, ended) = channel();
         // Signals of the process are those of this thread, so the run has another one.
         let running = thread::Builder::new().name("esl-durable".into()).spawn(move || {

@@ -93,6 +93,9 @@ def test_another_process_and_another_program_are_refused(tmp_path):
     with pytest.raises(esl.CompileError) as refused:
         made("(exit").open()
     assert refused.value.diagnostics[0].code == "unclosed-list"
+    with pytest.raises(esl.CompileError):
+        esl.DurableEngine(tmp_path / "none", text="(exit").open()
+    assert not (tmp_path / "none").exists()
     with pytest.raises(ValueError, match="`loss` is not a durability"):
         made("(exit 3)", durability="loss").open()
     with pytest.raises(ValueError, match="`never`"):
@@ -128,6 +131,30 @@ def test_a_paused_run_goes_on_with_async_operations(tmp_path):
     again = made(seen)
     assert asyncio.run(again.run_async()) == 18 and seen == [4, 5]
     assert again.resumed.process == 2 and again.resumed.downtime >= 0
+
+
+def test_a_run_of_another_version_begins_anew_from_its_facts(tmp_path):
+    def made(**settings):
+        text = "(defdurable *count* 0) (incf *count*) (unless *begun-from-facts* (look) (sleep 0.001)) (exit *count*)"
+        engine = esl.DurableEngine(tmp_path / "state", text=text, **settings)
+
+        @engine.function
+        def look():
+            engine.pause()
+
+        return engine
+
+    assert made().run() is None
+    journal = tmp_path / "state" / "journal.eslj"
+    contents = bytearray(journal.read_bytes())
+    contents[8:12] = (1).to_bytes(4, "little")
+    journal.write_bytes(contents)
+    with pytest.raises(esl.NotDurable, match="another version|cannot read"):
+        made().open()
+    again = made(from_facts=True)
+    assert again.run() == 2
+    with pytest.raises(RuntimeError, match="make another engine of its folder"):
+        again.run()
 
 
 def test_an_async_operation_under_way_goes_on_in_the_next_loop(tmp_path):

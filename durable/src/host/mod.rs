@@ -446,12 +446,8 @@ impl<H: Host> Host for DurableHost<H> {
         if self.log.has_failed() {
             return vec![Incoming::Signal(ProcessSignal::Interrupt), Incoming::Stop];
         }
-        let mut pauses = self.control.takes_pause();
-        if pauses && !self.control.may_pause() {
-            // The next round begins with the snapshot.
-            self.inbox.ring();
-            pauses = false;
-        }
+        let is_asked = self.control.takes_pause();
+        let pauses = is_asked && self.control.may_pause();
         if pauses {
             self.control.note_time(self.live.host_mut().monotonic());
         }
@@ -478,6 +474,10 @@ impl<H: Host> Host for DurableHost<H> {
             contents
         };
         self.lasting.hear_news(&contents);
+        if is_asked && !pauses {
+            // The next round begins with the snapshot. The look into the inbox has quietened it.
+            self.inbox.ring();
+        }
         if pauses || comes_back {
             contents.push(Incoming::Stop);
         } else if contents.is_empty() && self.is_live() && self.control.takes_interruption() {

@@ -6,13 +6,12 @@ use std::sync::Mutex;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use clap::{Args, Subcommand};
-use esl::Config;
 use esl::host::{ProcessSignal, Rights};
-use esl::module_path::ModulePath;
 use esl::program::{self, Modules};
 use esl::size::parse_size;
 use esl_agents::{
-    AgentError, AgentsHost, HostClient, HostRequest, HostSettings, HostSurroundings, begin_agent,
+    AgentError, AgentOrigin, AgentsHost, HostClient, HostRequest, HostSettings, HostSurroundings, NewAgent,
+    begin_agent,
 };
 use esl_command::{
     NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain, print_diagnostics, read_program, say, say_error,
@@ -20,7 +19,6 @@ use esl_command::{
 };
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_durable::{Downtime, Durability, DurableOptions, SnapshotEvery};
-use esl_replay::RunSetup;
 use serde_json::Value;
 
 use super::durable::{DowntimeChoice, DurabilityChoice};
@@ -47,6 +45,10 @@ pub(crate) struct HostOptions {
     /// Store the machine of an agent after so much time or journal, as for `eslvm run --state`
     #[arg(long, value_name = "WHEN")]
     snapshot_every: Option<SnapshotEvery>,
+    /// Begin the agents of another version of eslvm anew, with their programs as they are now, their facts,
+    /// and the variables of DEFDURABLE
+    #[arg(long)]
+    from_facts: bool,
     #[command(flatten)]
     rights: RightsOptions,
     /// Folder of the agents
@@ -170,7 +172,13 @@ pub(crate) fn run_host(options: &HostOptions) -> Result<u8, u8> {
     };
     let snapshots = options.snapshot_every.unwrap_or_default();
     let settings = HostSettings {
-        durable: DurableOptions { durability, downtime, snapshots, hosted: None, from_facts: false },
+        durable: DurableOptions {
+            durability,
+            downtime,
+            snapshots,
+            hosted: None,
+            from_facts: options.from_facts,
+        },
         rights,
         sleep_after: options.sleep_after,
         awake: options.awake as usize,
@@ -212,8 +220,11 @@ pub(crate) fn run_agents(options: &AgentsOptions) -> Result<u8, u8> {
     let folder = options.folder.as_path();
     let request = match &options.action {
         AgentsAction::Begin { memory, seed, modules, name, program, arguments } => {
-            let config = Config { memory: *memory, seed: *seed, ..Config::default() };
-            begin(folder, name, program, arguments, config, &modules.library)?;
+            // The host may have another working folder.
+            let absolute = |path: &PathBuf| std::fs::canonicalize(path).unwrap_or_else(|_| path.clone());
+            let library = modules.library.iter().map(absolute).collect();
+            let origin = AgentOrigin { file: absolute(program), library, memory: *memory, seed: *seed };
+            begin(folder, name, arguments, &origin)?;
             // Without a host the agent waits for one.
             if let Ok(mut client) = HostClient::connect(folder) {
                 let start = HostRequest::Start(name.clone());
@@ -238,18 +249,9 @@ pub(crate) fn run_agents(options: &AgentsOptions) -> Result<u8, u8> {
 }
 
 /// Begins an agent.
-fn begin(
-    folder: &Path,
-    name: &str,
-    file: &Path,
-    arguments: &[String],
-    config: Config,
-    library: &[PathBuf],
-) -> Result<(), u8> {
-    // The host may have another working folder.
-    let file = std::fs::canonicalize(file).unwrap_or_else(|_| file.into());
-    let path = ModulePath::new([file.as_path()], library);
-    let program = match read_program(&file)? {
+fn begin(folder: &Path, name: &str, arguments: &[String], origin: &AgentOrigin) -> Result<(), u8> {
+    let path = origin.path();
+    let program = match read_program(&origin.file)? {
         ProgramFile::Compiled(program) => program,
         ProgramFile::Source(source) => {
             let compiled = program::compile_with(&[source], &path, Modules::Inside);
@@ -257,10 +259,9 @@ fn begin(
             compiled.program.ok_or(NOT_COMPILED)?
         }
     };
-    let folders = path.folders().iter().map(|folder| folder.to_string_lossy().into_owned()).collect();
-    let setup = RunSetup { config, folders, program_file: path.program_file(), ..RunSetup::default() };
-    begin_agent(folder, name, (&program, arguments), &setup, esl_world::install_operations)
-        .map_err(|error| refused(&error))
+    let setup = origin.setup();
+    let agent = NewAgent { program: &program, arguments, setup: &setup, origin: Some(origin) };
+    begin_agent(folder, name, agent, esl_world::install_operations).map_err(|error| refused(&error))
 }
 
 /// Returns a line about an agent.

@@ -203,3 +203,76 @@ fn a_timer_wakes_an_agent_and_few_places_serve_many() {
     names.iter().for_each(|name| agents.wait_for(&format!("{name}: ended with status 9")));
     assert_eq!(host.end("-INT").0, Some(0));
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn agents_with_the_same_addresses_take_turns() {
+    let agents = AgentsFolder::new("agents-addresses");
+    agents.begin("one");
+    let host = agents.host(&["--sleep-after", "1ms", "--snapshot-every", "1ms"]);
+    agents.send("one", 1);
+    agents.wait_for("one: asleep");
+    assert_eq!(host.end("-TERM").0, Some(0));
+    let folder = agents.folder.path().join("agents");
+    let copied =
+        Command::new("cp").arg("-a").args([folder.join("one.state"), folder.join("two.state")]).status();
+    assert!(copied.expect("there is a cp").success());
+    let host = agents.host(&["--sleep-after", "1h", "--snapshot-every", "1ms"]);
+    for number in 2..5 {
+        agents.send("one", number);
+        agents.send("two", 10 * number);
+    }
+    assert_eq!(host.end("-TERM").0, Some(0));
+    assert_eq!((agents.sum("one"), agents.sum("two")), ("(SUM 10)".into(), "(SUM 91)".into()));
+}
+
+#[test]
+fn agents_of_another_version_begin_anew_from_their_facts() {
+    let agents = AgentsFolder::new("agents-facts");
+    let text = "(define-input add) (defdurable *sum* 0)
+(format t \"~a ~a~%\" (and *begun-from-facts* t) (command-line-arguments))
+(loop (incf *sum* (wait-for-event add)) (format t \"sum ~a~%\" *sum*) (finish-output))";
+    let program = agents.folder.file("sum.esl", text);
+    agents.done(&["begin", "one", &program, "x"]);
+    agents.done(&["begin", "new", &program]);
+    let host = agents.host(&["--sleep-after", "1ms"]);
+    agents.send("one", 5);
+    agents.wait_for("one: asleep");
+    agents.done(&["stop", "new"]);
+    assert_eq!(host.end("-KILL").0, None);
+    let trial = agents
+        .folder
+        .file("other.esl", &text.replace("(incf *sum* (", "(incf *sum* (* 2 (").replace("add))", "add)))"));
+    let one = agents.folder.join("agents/one.state");
+    let tried = eslvm(&["state", "--upgrade", &trial, &one]).output().expect("the command is there");
+    // An agent that waits for messages is in no deadlock.
+    assert!(!String::from_utf8_lossy(&tried.stdout).contains("Deadlock"), "{tried:?}");
+    let journal = agents.folder.join("agents/one.state/journal.eslj");
+    let mut bytes = fs::read(&journal).expect("it is there");
+    bytes[8..12].copy_from_slice(&1_u32.to_le_bytes());
+    fs::write(&journal, bytes).expect("there is room");
+    let host = agents.host(&[]);
+    let (status, _, errors) = agents.agents(&["send", "one", "add", "1"]);
+    assert!(status == Some(2) && errors.contains("type `--from-facts`"), "{errors}");
+    assert_eq!(host.end("-TERM").0, Some(0));
+    let host = agents.host(&["--from-facts", "--sleep-after", "1ms"]);
+    agents.send("one", 6);
+    agents.done(&["end", "one"]);
+    agents.wait_for("one: ended with status 143");
+    let (status, output, errors) = host.end("-TERM");
+    assert!(status == Some(0) && errors.contains("one: begun by another version of eslvm"), "{errors}");
+    assert!(output.ends_with("one: T (x)\none: sum 11\n"), "{output}");
+}
+
+#[test]
+fn an_agent_whose_folder_is_gone_is_not_made_again() {
+    let agents = AgentsFolder::new("agents-gone");
+    agents.begin("one");
+    let host = agents.host(&["--sleep-after", "1ms"]);
+    agents.wait_for("one: asleep");
+    fs::remove_dir_all(agents.folder.join("agents/one.state")).expect("it is there");
+    let (status, _, errors) = agents.agents(&["send", "one", "add", "1"]);
+    assert!(status == Some(2) && errors.contains("there is no durable run in"), "{errors}");
+    assert!(!agents.folder.path().join("agents/one.state").exists());
+    assert_eq!(host.end("-TERM").0, Some(0));
+}

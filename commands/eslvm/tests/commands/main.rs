@@ -20,6 +20,7 @@ mod deadlock;
 mod documents;
 #[cfg(unix)]
 mod durable;
+mod durable_facts;
 mod durable_operators;
 mod durable_services;
 mod durable_upgrades;
