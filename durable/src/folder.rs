@@ -63,7 +63,11 @@ impl RunFolder {
         let taken = RunFolder::take(path);
         match &taken {
             Ok(folder) => folder.is_new.store(is_new, Ordering::Relaxed),
-            Err(_) if is_new => drop(fs::remove_dir(path)),
+            // Such as a full disk. Another error says that another process has it by now.
+            Err(DurableError::Folder(..)) if is_new => {
+                drop(fs::remove_file(path.join(LOCK)));
+                drop(fs::remove_dir(path));
+            }
             Err(_) => {}
         }
         taken
