@@ -22,6 +22,17 @@ fn takes(lambda: &Lambda, arguments: &CallArguments) -> bool {
     lambda.required.len() <= count && (is_open || count <= lambda.required.len() + lambda.optional.len())
 }
 
+/// Whether a call is known to give as many arguments as a function takes, and keywords that it has.
+fn has_known_keys(lambda: &Lambda, arguments: &CallArguments) -> bool {
+    if !arguments.lists.is_empty() || !arguments.any.is_empty() {
+        return false;
+    }
+    let Some(keys) = &lambda.keys else { return true };
+    let further = arguments.given.get(lambda.required.len() + lambda.optional.len()..).unwrap_or_default();
+    let is_known = |name: &Symbol| lambda.allow_other_keys || keys.iter().any(|key| key.key == *name);
+    further.len() % 2 == 0 && further.chunks(2).all(|pair| pair[0].1.as_ref().is_some_and(is_known))
+}
+
 impl ValueFlow<'_> {
     /// Calls a global function by its name.
     pub(crate) fn call_named(
@@ -119,8 +130,15 @@ impl ValueFlow<'_> {
     fn call_closure(&mut self, point: &CallPoint, code: Code) {
         let forms = self.forms;
         let lambda = &forms.forms[code.form as usize].core.lambdas[code.lambda.index()];
+        let is_through = point.passing == Passing::Through;
         if !takes(lambda, &point.arguments) {
+            if is_through {
+                self.note(point.spot, NodeEffect::Mistake(mistake::PROGRAM));
+            }
             return;
+        }
+        if is_through && !has_known_keys(lambda, &point.arguments) {
+            self.note(point.spot, NodeEffect::Mistake(mistake::PROGRAM));
         }
         let code = Code { context: self.context_for(code, point.spot), ..code };
         self.run(code);
@@ -253,7 +271,12 @@ impl ValueFlow<'_> {
             }
             FlowValue::Condition(name) => NodeEffect::Fail(FailureKind::Condition(name)),
             FlowValue::Caught(guard) => NodeEffect::Again(guard),
-            FlowValue::EndOf(work) => NodeEffect::FailAs(work),
+            FlowValue::CauseOfCaught(guard) => NodeEffect::AgainByCause(guard),
+            FlowValue::CauseOf(name) => NodeEffect::Fail(FailureKind::CauseOf(name)),
+            FlowValue::EndOf(work) => {
+                self.note(spot, NodeEffect::FailByCauseOf(work));
+                NodeEffect::FailAs(work)
+            }
             FlowValue::AnySymbol => NodeEffect::Fail(FailureKind::Any(Reason::Computed)),
             _ => return,
         };

@@ -173,7 +173,9 @@ pub(crate) fn clause_applies(
         FailureKind::Below(name) if is_above_cause(forms, symbol(name), wanted) => Applies::Yes,
         FailureKind::Below(name) if is_above_cause(forms, wanted, symbol(name)) => Applies::Perhaps,
         FailureKind::Below(_) => Applies::No,
-        FailureKind::Condition(name) => condition_has_name(forms, symbol(name), wanted).into(),
+        FailureKind::Condition(name) | FailureKind::CauseOf(name) => {
+            condition_has_name(forms, symbol(name), wanted).into()
+        }
         FailureKind::Any(_) | FailureKind::Unknown(_) => Applies::Perhaps,
     }
 }
@@ -202,7 +204,9 @@ pub(crate) fn is_of_type(
     let name = symbol.name();
     let is_wide = matches!(name, "SERIOUS-CONDITION" | "CONDITION" | "T");
     match kind {
-        FailureKind::Cause(_) | FailureKind::Below(_) => (is_wide || name == "FAILURE").into(),
+        FailureKind::Cause(_) | FailureKind::Below(_) | FailureKind::CauseOf(_) => {
+            (is_wide || name == "FAILURE").into()
+        }
         FailureKind::Condition(condition) => {
             let condition = &names.keys[condition.index()];
             if !is_condition(forms, condition) {
@@ -221,19 +225,21 @@ pub(crate) fn is_of_type(
 pub(crate) fn mistakes_named(name: &str) -> (u8, u8) {
     use mistake::*;
     match name {
-        "TYPE-ERROR" => (TYPE, TYPE),
-        "ARITHMETIC-ERROR" => (ARITHMETIC, ARITHMETIC),
-        "CELL-ERROR" => (NAME, NAME),
-        "ERROR" => (ALL & !CRITICAL & !CONSEQUENCE, ALL & !CRITICAL & !CONSEQUENCE),
+        "TYPE-ERROR" => (TYPE, TYPE | CAUSE),
+        "ARITHMETIC-ERROR" => (ARITHMETIC, ARITHMETIC | CAUSE),
+        "CELL-ERROR" => (NAME, NAME | CAUSE),
+        "ERROR" => (ALL & !CRITICAL & !CONSEQUENCE & !CAUSE, ALL & !CRITICAL & !CONSEQUENCE),
         "GENERAL-FAILURE" | "SERIOUS-CONDITION" | "CONDITION" | "T" => (ALL, ALL),
-        "FAILURE" => (CRITICAL | CONSEQUENCE, CRITICAL | CONSEQUENCE),
-        "DIVISION-BY-ZERO" | "FLOATING-POINT-OVERFLOW" | "FLOATING-POINT-UNDERFLOW" => (0, ARITHMETIC),
-        "UNBOUND-VARIABLE" | "UNDEFINED-FUNCTION" | "UNBOUND-SLOT" => (0, NAME),
-        "PROGRAM-ERROR" | "CONTROL-ERROR" => (0, PROGRAM),
+        "FAILURE" => (CRITICAL | CONSEQUENCE | CAUSE, CRITICAL | CONSEQUENCE | CAUSE),
+        "DIVISION-BY-ZERO" | "FLOATING-POINT-OVERFLOW" | "FLOATING-POINT-UNDERFLOW" => {
+            (0, ARITHMETIC | CAUSE)
+        }
+        "UNBOUND-VARIABLE" | "UNDEFINED-FUNCTION" | "UNBOUND-SLOT" => (0, NAME | CAUSE),
+        "PROGRAM-ERROR" | "CONTROL-ERROR" => (0, PROGRAM | CAUSE),
         "BUDGET-EXHAUSTED" | "WOULD-BLOCK" => (0, CRITICAL),
         "ALL-FAILED" => (0, CONSEQUENCE),
         "FILE-ERROR" | "STREAM-ERROR" | "PARSE-ERROR" | "END-OF-FILE" | "READER-ERROR" | "SIMPLE-ERROR"
-        | "PACKAGE-ERROR" | "PRINT-NOT-READABLE" => (0, OTHER),
+        | "PACKAGE-ERROR" | "PRINT-NOT-READABLE" => (0, OTHER | CAUSE),
         _ => (0, 0),
     }
 }
@@ -256,7 +262,7 @@ pub(crate) fn mistakes_of_type(wanted: &Datum) -> (u8, u8) {
 }
 
 /// Kinds of programming errors, with their causes.
-pub(crate) const MISTAKES: [(u8, &str); 7] = [
+pub(crate) const MISTAKES: [(u8, &str); 8] = [
     (mistake::TYPE, ":type-error"),
     (mistake::ARITHMETIC, ":arithmetic-error"),
     (mistake::NAME, ":cell-error"),
@@ -264,4 +270,5 @@ pub(crate) const MISTAKES: [(u8, &str); 7] = [
     (mistake::OTHER, ":error"),
     (mistake::CRITICAL, ":would-block"),
     (mistake::CONSEQUENCE, ":all-failed"),
+    (mistake::CAUSE, ":error (as a cause)"),
 ];

@@ -11,6 +11,8 @@ pub(crate) enum FailureKind {
     Below(NameId),
     /// A condition of this type.
     Condition(NameId),
+    /// `fail` with the cause of a condition of this type: a failure of that name, which is not of the type.
+    CauseOf(NameId),
     /// A cause that is computed, or code that is: any.
     Any(Reason),
     /// An operation or a function of the host without a declaration.
@@ -42,8 +44,10 @@ pub(crate) mod mistake {
     pub(crate) const CRITICAL: u8 = 32;
     /// A failure that is possible only after a programming error.
     pub(crate) const CONSEQUENCE: u8 = 64;
+    /// A failure with the cause of a programming error, which is not the error itself.
+    pub(crate) const CAUSE: u8 = 128;
     /// All of them.
-    pub(crate) const ALL: u8 = 127;
+    pub(crate) const ALL: u8 = 255;
     /// Those of a call of any function of the library.
     pub(crate) const OF_CALLS: u8 = TYPE | NAME | PROGRAM | OTHER;
 }
@@ -69,6 +73,10 @@ pub(crate) enum NodeEffect {
     FailAll(WorkId),
     /// It fails with a condition that the handling form at this place has caught.
     Again(Spot),
+    /// It fails with the cause of such a condition.
+    AgainByCause(Spot),
+    /// It fails with the cause with which a task or an operation has failed.
+    FailByCauseOf(WorkId),
     /// The limit of a task ends it with this cause.
     Limit(WorkId, NameId),
     /// It may be a programming error of these kinds.

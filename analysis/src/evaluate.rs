@@ -160,7 +160,12 @@ impl ValueFlow<'_> {
                 self.copy(thrown, value);
                 self.join(here, *body, value);
             }
-            NodeKind::Throw(_, from) => {
+            NodeKind::Throw(tag, from) => {
+                // There may be no `catch`; a clause leaves for its own form.
+                let is_of_clause = matches!(form.kind(*tag), NodeKind::Local(tag) if form.is_state(*tag));
+                if !is_of_clause {
+                    self.note(spot, NodeEffect::Mistake(mistake::PROGRAM));
+                }
                 let thrown = self.cell(CellKey::Thrown);
                 self.join(here, *from, thrown);
             }

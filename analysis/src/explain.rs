@@ -128,7 +128,7 @@ impl Maker<'_, '_> {
         format!(
             "the clause for {} at {}, in {function}",
             wanted.to_lowercase(),
-            self.place_inside(code.form, node)
+            self.place_of(self.span_of_clause(code.form, scope, node))
         )
     }
 

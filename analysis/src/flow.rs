@@ -429,10 +429,9 @@ impl<'a> ValueFlow<'a> {
                 }
             }
             FlowWatcher::Causes(to) => match value {
-                FlowValue::Caught(_)
-                | FlowValue::EndOf(_)
-                | FlowValue::Condition(_)
-                | FlowValue::AnySymbol => self.add(*to, value),
+                FlowValue::Caught(spot) => self.add(*to, FlowValue::CauseOfCaught(spot)),
+                FlowValue::Condition(name) => self.add(*to, FlowValue::CauseOf(name)),
+                FlowValue::EndOf(_) | FlowValue::AnySymbol => self.add(*to, value),
                 _ => {}
             },
             FlowWatcher::Ends(to) => {
@@ -462,7 +461,13 @@ impl ValueFlow<'_> {
         let Some(number) = self.number_of(code) else { return true };
         self.running[number].effects.iter().any(|(node, effect)| {
             *node == spot.node
-                && matches!(effect, NodeEffect::Fail(_) | NodeEffect::FailAs(_) | NodeEffect::Again(_))
+                && matches!(
+                    effect,
+                    NodeEffect::Fail(_)
+                        | NodeEffect::FailAs(_)
+                        | NodeEffect::Again(_)
+                        | NodeEffect::AgainByCause(_)
+                )
         })
     }
 }

@@ -30,6 +30,18 @@ pub(crate) enum ScopeKind {
     ClauseBody(usize),
 }
 
+impl ScopeKind {
+    /// Returns the handling form.
+    pub(crate) fn node(&self) -> Option<NodeId> {
+        match self {
+            ScopeKind::Recovery { node, .. }
+            | ScopeKind::Cases { node, .. }
+            | ScopeKind::Handlers { node, .. } => Some(*node),
+            ScopeKind::ClauseBody(_) => None,
+        }
+    }
+}
+
 /// A top-level form.
 #[derive(Debug)]
 pub(crate) struct CoreForm {
@@ -44,6 +56,8 @@ pub(crate) struct CoreForm {
     pub(crate) nodes_of: Vec<Vec<NodeId>>,
     /// Node of each block.
     pub(crate) block_nodes: Vec<NodeId>,
+    /// Whether each node is in the cleanup of an `unwind-protect` of the same lambda.
+    pub(crate) in_cleanup: Vec<bool>,
     /// Bodies of the clauses of a lambda that runs clauses.
     clause_bodies: FxHashMap<LambdaId, Vec<NodeId>>,
 }
@@ -57,10 +71,12 @@ impl CoreForm {
             scopes: Vec::new(),
             nodes_of: vec![Vec::new(); core.lambdas.len()],
             block_nodes: vec![NodeId(0); core.blocks.len()],
+            in_cleanup: vec![false; count],
             clause_bodies: FxHashMap::default(),
             core,
         };
         form.note_places();
+        form.note_cleanups();
         form
     }
 
@@ -86,6 +102,46 @@ impl CoreForm {
                 self.enter(node, scope, &mut row, &mut pending);
             }
         }
+    }
+
+    /// Notes the nodes of cleanups.
+    fn note_cleanups(&mut self) {
+        let mut pending = Vec::new();
+        for node in &self.core.nodes {
+            if let NodeKind::UnwindProtect(_, cleanup) = &node.kind {
+                pending.push(*cleanup);
+            }
+        }
+        while let Some(node) = pending.pop() {
+            if !std::mem::replace(&mut self.in_cleanup[node.index()], true) {
+                children(&self.core.nodes[node.index()].kind, &mut |child| pending.push(child));
+            }
+        }
+    }
+
+    /// Whether a variable has the state of a recovery form, to which its clauses leave.
+    pub(crate) fn is_state(&self, variable: VarId) -> bool {
+        self.clause_bodies.keys().any(|lambda| {
+            let first = self.core.lambdas[lambda.index()].required.first();
+            first.is_some_and(|parameter| parameter.variable == variable)
+        })
+    }
+
+    /// Returns the value of an option of the `spawn` whose call of `%spawn` a node is: not of one in its body.
+    pub(crate) fn spawn_option(&self, node: NodeId, name: &str) -> Option<NodeId> {
+        let is_spawn = matches!(self.kind(node), NodeKind::Call(callee, arguments)
+            if arguments.len() > 1 && symbol_of(callee).is_some_and(|symbol| symbol.name() == "%SPAWN"));
+        let around = self.core.nodes[node.index()].span;
+        let is_name =
+            |item: &NodeId| self.symbol(*item).is_some_and(|key| key.is_keyword() && key.name() == name);
+        let owner = self.owners[node.index()];
+        let mut here = self.nodes_of[owner.index()].iter().filter(|_| is_spawn);
+        here.find_map(|list| {
+            let NodeKind::Call(_, items) = self.kind(*list) else { return None };
+            let position = items.iter().position(is_name).filter(|position| position % 2 == 0)?;
+            let is_inside = around.contains(self.core.nodes[items[position].index()].span);
+            items.get(position + 1).copied().filter(|_| is_inside)
+        })
     }
 
     fn add_scope(&mut self, kind: ScopeKind, parent: Option<usize>) -> usize {
@@ -250,11 +306,7 @@ impl CoreForms {
         let mut found = Vec::new();
         for (number, node) in form.core.nodes.iter().enumerate() {
             if let NodeKind::Call(callee, arguments) | NodeKind::Apply(callee, arguments) = &node.kind {
-                let symbol = match callee {
-                    Callee::Global(symbol) => symbol.clone(),
-                    Callee::Builtin(builtin) => builtin.symbol(),
-                    _ => continue,
-                };
+                let Some(symbol) = symbol_of(callee) else { continue };
                 found.push((NodeId(number as u32), symbol, arguments.clone()));
             }
         }
@@ -355,6 +407,15 @@ pub(crate) fn script_nodes(form: &CoreForm, list: NodeId) -> Vec<Vec<NodeId>> {
 
 fn script_names(form: &CoreForm, list: NodeId) -> Vec<Symbol> {
     script_nodes(form, list).iter().filter_map(|parts| form.symbol(parts[0]).cloned()).collect()
+}
+
+/// Returns the symbol that a call names.
+fn symbol_of(callee: &Callee) -> Option<Symbol> {
+    match callee {
+        Callee::Global(symbol) => Some(symbol.clone()),
+        Callee::Builtin(builtin) => Some(builtin.symbol()),
+        Callee::Local(_) | Callee::Value(_) => None,
+    }
 }
 
 /// Returns the elements of a constant, at all depths, that are symbols.

@@ -19,15 +19,28 @@ pub(crate) type FailureId = u32;
 pub(crate) struct LeavingFailures {
     pub(crate) failures: BTreeSet<FailureId>,
     pub(crate) mistakes: u8,
+    /// Those that may begin in a cleanup, while control leaves for a clause that has been called already.
+    pub(crate) late: BTreeSet<FailureId>,
+    pub(crate) late_mistakes: u8,
 }
 
 impl LeavingFailures {
+    /// Has all of them be late, as those of a cleanup are.
+    pub(crate) fn delay(&mut self) {
+        self.late.clone_from(&self.failures);
+        self.late_mistakes = self.mistakes;
+    }
+
     /// Adds those of another. Returns whether that has added any.
     pub(crate) fn add(&mut self, other: &LeavingFailures) -> bool {
-        let before = (self.failures.len(), self.mistakes);
+        let size =
+            |one: &LeavingFailures| (one.failures.len(), one.mistakes, one.late.len(), one.late_mistakes);
+        let before = size(self);
         self.failures.extend(&other.failures);
         self.mistakes |= other.mistakes;
-        before != (self.failures.len(), self.mistakes)
+        self.late.extend(&other.late);
+        self.late_mistakes |= other.late_mistakes;
+        before != size(self)
     }
 
     /// Whether it is empty.
@@ -87,7 +100,12 @@ pub(crate) fn recover(
                 from == clause || triggers(clause, from) || clauses[clause].ways.retries || resumes[clause]
             }
         };
-        clauses[clause].limit != ClauseLimit::None && may_be_spent
+        match clauses[clause].limit {
+            ClauseLimit::None => false,
+            // It may be 0.
+            ClauseLimit::Computed => true,
+            ClauseLimit::Times(_) => may_be_spent,
+        }
     };
     let mut done = vec![false; count];
     let mut sources: Vec<(Option<usize>, &LeavingFailures)> = vec![(None, body)];
@@ -102,11 +120,15 @@ pub(crate) fn recover(
                 if match_ == Applies::No {
                     continue;
                 }
-                goes_on = match_ == Applies::Perhaps || passes_on(clause, from);
+                let is_late = guarding.limit != ClauseLimit::None && source.late.contains(failure);
+                goes_on = match_ == Applies::Perhaps || passes_on(clause, from) || is_late;
                 handled.taken[clause].insert((*failure, goes_on));
             }
             if goes_on {
                 handled.leaving.failures.insert(*failure);
+                if source.late.contains(failure) {
+                    handled.leaving.late.insert(*failure);
+                }
             }
         }
         let mut left = source.mistakes;
@@ -114,10 +136,12 @@ pub(crate) fn recover(
             let (all, some) = mistakes_named(guarding.cause.name());
             handled.mistakes[clause] |= left & some;
             if !passes_on(clause, from) && guarding.limit != ClauseLimit::Times(0) {
-                left &= !all;
+                let late = if guarding.limit == ClauseLimit::None { 0 } else { source.late_mistakes };
+                left &= !all | late;
             }
         }
         handled.leaving.mistakes |= left;
+        handled.leaving.late_mistakes |= left & source.late_mistakes;
         for (clause, guarding) in clauses.iter().enumerate() {
             // A limit of the run may come at any place.
             let is_wide = matches!(
@@ -156,6 +180,9 @@ pub(crate) fn take(known: &FailureFacts<'_>, body: &LeavingFailures, types: &[Da
         }
         if goes_on {
             handled.leaving.failures.insert(*failure);
+            if body.late.contains(failure) {
+                handled.leaving.late.insert(*failure);
+            }
         }
     }
     let mut left = body.mistakes;
@@ -165,5 +192,6 @@ pub(crate) fn take(known: &FailureFacts<'_>, body: &LeavingFailures, types: &[Da
         left &= !all;
     }
     handled.leaving.mistakes = left;
+    handled.leaving.late_mistakes = left & body.late_mistakes;
     handled
 }

@@ -94,6 +94,27 @@ impl Solution {
         number
     }
 
+    /// Returns failures with the causes of others: they are no longer of the types of their conditions.
+    fn by_cause(&mut self, others: &LeavingFailures) -> LeavingFailures {
+        let mut leaving = LeavingFailures::default();
+        for id in &others.failures {
+            let failing = self.failures.keys[*id as usize];
+            let id = match failing.kind {
+                FailureKind::Condition(name) => {
+                    self.failure(FailureKind::CauseOf(name), failing.form, failing.node)
+                }
+                _ => *id,
+            };
+            leaving.failures.insert(id);
+        }
+        let plain = mistake::CRITICAL | mistake::CONSEQUENCE | mistake::CAUSE;
+        leaving.mistakes = others.mistakes & plain;
+        if others.mistakes & !plain != 0 {
+            leaving.mistakes |= mistake::CAUSE;
+        }
+        leaving
+    }
+
     /// Finds the failures that end a task. Returns whether some are new.
     fn end_work(&mut self, flow: &ValueFlow<'_>, work: WorkId, codes: &[Code]) -> bool {
         let mut all = LeavingFailures::default();
@@ -113,7 +134,10 @@ impl Solution {
         let mut result = LeavingFailures::default();
         let mut scopes: FxHashMap<usize, LeavingFailures> = FxHashMap::default();
         for (node, effect) in &running.effects {
-            let leaving = self.effect(flow, code, *node, *effect);
+            let mut leaving = self.effect(flow, code, *node, *effect);
+            if form.in_cleanup[node.index()] {
+                leaving.delay();
+            }
             match form.scope_of[node.index()] {
                 Some(scope) => _ = scopes.entry(scope).or_default().add(&leaving),
                 None => _ = result.add(&leaving),
@@ -127,7 +151,7 @@ impl Solution {
                 continue;
             }
             let inside = scopes.remove(&scope).unwrap_or_default();
-            let out = match &form.scopes[scope].kind {
+            let mut out = match &form.scopes[scope].kind {
                 ScopeKind::ClauseBody(position) => {
                     let known = self.of_clauses.entry((number, *position)).or_default();
                     has_changed |= known.add(&inside);
@@ -135,6 +159,9 @@ impl Solution {
                 }
                 kind => self.handle(flow, code, number, scope, kind, &inside),
             };
+            if form.scopes[scope].kind.node().is_some_and(|node| form.in_cleanup[node.index()]) {
+                out.delay();
+            }
             match form.scopes[scope].parent {
                 Some(parent) => _ = scopes.entry(parent).or_default().add(&out),
                 None => _ = result.add(&out),
@@ -145,13 +172,7 @@ impl Solution {
 
     /// Whether a scope is one of the lambda of a piece of code.
     fn is_in(&self, form: &CoreForm, scope: usize, code: Code) -> bool {
-        let node = match &form.scopes[scope].kind {
-            ScopeKind::Recovery { node, .. }
-            | ScopeKind::Cases { node, .. }
-            | ScopeKind::Handlers { node, .. } => *node,
-            ScopeKind::ClauseBody(_) => return false,
-        };
-        form.owners[node.index()] == code.lambda
+        form.scopes[scope].kind.node().is_some_and(|node| form.owners[node.index()] == code.lambda)
     }
 
     /// Returns the failures that leave a handling form.
@@ -193,6 +214,7 @@ impl Solution {
             let all = LeavingFailures {
                 failures: handled.taken.iter().flatten().map(|(failure, _)| *failure).collect(),
                 mistakes: handled.mistakes.iter().fold(0, |all, one| all | one),
+                ..LeavingFailures::default()
             };
             self.has_caught |= caught.add(&all);
         }
@@ -226,7 +248,10 @@ impl Solution {
                 leaving.failures.insert(failure);
             }
             NodeEffect::FailAs(work) => {
-                leaving = self.of_works[work.index()].clone();
+                // It is a failure of this place.
+                let of_work = &self.of_works[work.index()];
+                leaving.failures.clone_from(&of_work.failures);
+                leaving.mistakes = of_work.mistakes;
                 if let WorkKey::Host(name) = flow.works[work.index()].key {
                     for kind in kinds_of_host(flow, name) {
                         let failure = self.failure(kind, code.form, node);
@@ -250,6 +275,14 @@ impl Solution {
                 } else if tasks.iter().all(|work| !self.of_works[work.index()].is_empty()) {
                     leaving.mistakes = mistake::CONSEQUENCE;
                 }
+            }
+            NodeEffect::AgainByCause(guard) => {
+                let caught = self.caught.get(&guard).cloned().unwrap_or_default();
+                return self.by_cause(&caught);
+            }
+            NodeEffect::FailByCauseOf(work) => {
+                let ends = self.of_works[work.index()].clone();
+                return self.by_cause(&ends);
             }
             NodeEffect::Again(guard) => return self.caught.get(&guard).cloned().unwrap_or_default(),
             NodeEffect::Mistake(kinds) => leaving.mistakes = kinds,

@@ -46,13 +46,19 @@ impl Maker<'_, '_> {
         self.place_of(span)
     }
 
-    /// Returns the place of the first part of a node that has a place of its own; a macro's parts have that
-    /// of the call.
-    pub(crate) fn place_inside(&self, form: u32, node: NodeId) -> CodePlace {
-        self.place_of(self.span_inside(form, node))
+    /// Returns the range of the body of a clause. The parts of a macro have the range of its call; then it is
+    /// that of the first part with a range of its own.
+    pub(crate) fn span_of_clause(&self, form: u32, scope: usize, body: NodeId) -> Span {
+        let text = &self.flow.forms.forms[form as usize];
+        let span_of = |node: NodeId| text.core.nodes[node.index()].span;
+        let is_own = |of: NodeId| of != body && span_of(of) != span_of(body);
+        match text.scopes[scope].kind.node() {
+            Some(of) if is_own(of) => span_of(body),
+            _ => self.span_inside(form, body),
+        }
     }
 
-    /// Returns the range of that part.
+    /// Returns the range of the first part of a node that has a range of its own.
     pub(crate) fn span_inside(&self, form: u32, node: NodeId) -> Span {
         let text = &self.flow.forms.forms[form as usize];
         let whole = text.core.nodes[node.index()].span;
@@ -72,7 +78,8 @@ impl Maker<'_, '_> {
         best.unwrap_or(whole)
     }
 
-    fn place_of(&self, span: Span) -> CodePlace {
+    /// Returns the place of a range.
+    pub(crate) fn place_of(&self, span: Span) -> CodePlace {
         let source = self.sources.name(span.source).unwrap_or_default().to_string();
         match self.sources.place(span) {
             Some(place) => CodePlace { source, line: place.line, column: place.column },
@@ -111,7 +118,9 @@ impl Maker<'_, '_> {
                 let kinds = if has_kinds { " (or a kind of it)" } else { "" };
                 format!("{}{kinds}", symbol.to_string().to_lowercase())
             }
-            FailureKind::Condition(name) => cause_of_condition(self.flow.symbol(name)),
+            FailureKind::Condition(name) | FailureKind::CauseOf(name) => {
+                cause_of_condition(self.flow.symbol(name))
+            }
             FailureKind::Any(Reason::Computed) => "any (a computed cause)".into(),
             FailureKind::Any(Reason::Code) => "any (code that is made at run time)".into(),
             FailureKind::Unknown(name) => {
@@ -354,19 +363,9 @@ impl Maker<'_, '_> {
     /// Returns the name that the options of a `spawn` give to the task.
     fn given_name(&self, form: u32, node: NodeId) -> Option<String> {
         let text = &self.flow.forms.forms[form as usize];
-        let around = text.core.nodes[node.index()].span;
-        text.core.nodes.iter().find_map(|node| {
-            let NodeKind::Call(_, items) = &node.kind else { return None };
-            let is_name = |item: &NodeId| {
-                text.symbol(*item).is_some_and(|key| key.is_keyword() && key.name() == "NAME")
-            };
-            let position = items.iter().position(is_name)?;
-            let NodeKind::Constant(name) = text.kind(*items.get(position + 1)?) else { return None };
-            around.contains(text.core.nodes[items[position].index()].span).then(|| {
-                let shown = name.to_string().to_lowercase();
-                shown.trim_matches('"').to_string()
-            })
-        })
+        let NodeKind::Constant(name) = text.kind(text.spawn_option(node, "NAME")?) else { return None };
+        let shown = name.to_string().to_lowercase();
+        Some(shown.trim_matches('"').to_string())
     }
 
     fn name_of_task(&self, bodies: &[Code], kind: TaskKind) -> String {

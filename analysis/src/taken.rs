@@ -53,7 +53,8 @@ impl Maker<'_, '_> {
                 }
                 ScopeKind::ClauseBody(_) => continue,
             };
-            let place = self.place_inside(form, node);
+            let span = self.span_of_clause(form, scope, node);
+            let place = self.place_of(span);
             if !self.is_own(&place.source) {
                 continue;
             }
@@ -73,7 +74,7 @@ impl Maker<'_, '_> {
                 answer,
                 causes,
                 fails: self.rows_of(&fails),
-                span: self.span_inside(form, node),
+                span,
                 never_ends,
             };
             rows.push(((form, scope, position), row));

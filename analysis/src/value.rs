@@ -69,6 +69,10 @@ pub(crate) enum FlowValue {
     Condition(NameId),
     /// A condition that the handling form at this place has caught.
     Caught(Spot),
+    /// The cause of a condition that the handling form at this place has caught.
+    CauseOfCaught(Spot),
+    /// The cause of a condition of this type.
+    CauseOf(NameId),
     /// The cause, or the condition, with which a task has failed.
     EndOf(WorkId),
     /// A generic function of this name.

@@ -46,6 +46,79 @@ fn clauses_take_failures_for_good_if_they_leave() {
 }
 
 #[test]
+fn a_clause_whose_number_is_computed_may_never_run() {
+    check("(defun f (n) (with-recovery-procedures ((:a :retries n (abort 1))) (fail :a)))", ":a");
+}
+
+#[test]
+fn a_cleanup_fails_while_control_leaves_for_a_clause_that_is_spent() {
+    let with = |clauses: &str| {
+        format!("(defun f () (with-recovery-procedures ({clauses}) (unwind-protect (fail :a) (fail :b))))")
+    };
+    check(&with("(:general-failure (abort 1))"), ":b");
+    check(&with("(:a (abort 1)) (:b :retries :infinite (abort 2))"), "");
+    check(&with("(:general-failure :retries :infinite (abort 1))"), "");
+    // The cleanup of a function; a handler is in force until control has left.
+    check(
+        "(defun work () (unwind-protect (fail :a) (fail :b)))
+         (defun f () (with-recovery-procedures ((:general-failure (abort 1))) (work)))",
+        ":b",
+    );
+    check("(defun f () (handler-case (unwind-protect (fail :a) (fail :b)) (failure () 1)))", "");
+    // A cleanup that runs before the search goes on has spent nothing.
+    check(
+        "(defun f () (with-recovery-procedures ((:b (abort 1))) (with-cleanup-procedure (fail :b) (fail :a))))",
+        ":a",
+    );
+}
+
+#[test]
+fn a_failure_with_the_cause_of_an_error_is_no_error() {
+    let again = |form: &str| {
+        format!(
+            "(define-condition slip (error) ())
+             (defun f () (ignore-errors (handler-case (error 'slip) (slip (one) ({form} one)))))"
+        )
+    };
+    check(&again("error"), "");
+    check(&again("(lambda (one) (fail (failure-cause one)))"), ":slip");
+    check(
+        "(defun f () (handler-case (fail (failure-cause (make-condition 'simple-error))) (error () 1)))",
+        ":simple-error",
+    );
+}
+
+/// Checks the programming errors that may leave the function `f`.
+fn check_mistakes(text: &str, expected: &[&str]) {
+    let mut compiled =
+        compile_with_core(&[Source::new("a.esl", text)], &esl::module_path::ModulePath::none());
+    let cores = std::mem::take(&mut compiled.core);
+    let (table, _) = analyze(cores, &compiled.sources, &AnalysisOptions { all: true, explained: None });
+    let row = table.functions.iter().find(|row| row.name == "f").expect("it defines the function");
+    let mistakes: Vec<&str> =
+        row.causes.iter().filter(|row| row.is_mistake).map(|row| row.cause.as_str()).collect();
+    assert_eq!(mistakes, expected, "{text}");
+}
+
+#[test]
+fn programming_errors_have_kinds() {
+    check_mistakes(
+        "(defun f () (without-interrupts (sleep 1)))",
+        &[":type-error", ":cell-error", ":program-error", ":error", ":would-block"],
+    );
+    check_mistakes("(defun g (&key one) one) (defun f () (g :one 1))", &[]);
+    check_mistakes("(defun g (&key one) one) (defun f () (g :two 1))", &[":program-error"]);
+    check_mistakes("(defun g (&key one) one) (defun f () (g :one))", &[":program-error"]);
+    check_mistakes("(defun g (one) one) (defun f () (g))", &[":program-error"]);
+    check_mistakes("(defun f () (throw 'place 1))", &[":program-error"]);
+    check_mistakes("(defun f () (with-recovery-procedures ((:a (retry)) (:b (abort 1))) 3))", &[]);
+    check_mistakes(
+        "(defun f () (handler-case (car 'a) (type-error (one) (fail (failure-cause one)))))",
+        &[":type-error", ":cell-error", ":program-error", ":error", ":error (as a cause)"],
+    );
+}
+
+#[test]
 fn a_module_fails_by_the_program_s_code() {
     check(
         "(defstruct activity failer)
@@ -77,6 +150,20 @@ fn a_failing_clause_comes_back_if_an_outer_one_resumes() {
         &format!("(defun f () (with-recovery-procedures ((:b :retries :infinite (values 1))) {inner}))"),
         ":a",
     );
+}
+
+#[test]
+fn clauses_are_shown_at_their_own_places() {
+    let table = table(
+        "(handler-case (fail :a)
+(failure ()
+(with-recovery-procedures (
+(:b (abort 1)))
+(fail :b))))",
+    );
+    let lines: Vec<(&str, u32)> =
+        table.clauses.iter().map(|clause| (clause.wanted.as_str(), clause.place.line)).collect();
+    assert_eq!(lines, [("failure", 3), (":b", 4)]);
 }
 
 #[test]
@@ -160,6 +247,10 @@ fn forms_of_tasks_fail_as_their_tasks() {
     check("(defun f () (supervise (:restarts 3) (a (fail :a))))", ":restarts-exhausted");
     check("(defun f () (spawn (fail :a)))", "");
     check("(defun f () (with-guardian (sleep 1) (fail :a) (sleep 2)))", ":a");
+    // The options of a task are not those of tasks in its body.
+    let nested = table("(spawn (:budget nil) (task-net (look (spawn (:name 'inner :budget 9) (fail :a)))))");
+    let names: Vec<&str> = nested.tasks.iter().map(|task| task.name.as_str()).collect();
+    assert_eq!(names, ["main", "spawned", "look", "inner"]);
     let spawned = table("(spawn (:name 'scout) (fail :a))");
     let scout = spawned.tasks.iter().find(|task| task.name == "scout").expect("there is such a task");
     assert_eq!(shown(&scout.causes), ":a");

@@ -41,6 +41,17 @@ fn tables_of_the_spacecraft() {
 }
 
 #[test]
+fn tables_of_the_missions_and_the_watchdog() {
+    let missions = ["cross-door", "drive-to-target", "pick-and-place", "safe-drive", "warehouse"];
+    let missions = missions.map(|name| ("missions", name));
+    for (folder, name) in missions.into_iter().chain([("watchdog", "watchdog"), ("watchdog", "service")]) {
+        let program = format!("examples/{folder}/{name}.esl");
+        let (table, _) = table_of(&program, &AnalysisOptions::default());
+        compare(&format!("{name}.txt"), &render(&table, TableFormat::Text));
+    }
+}
+
+#[test]
 fn the_picture_of_the_spacecraft() {
     let (table, _) = table_of("examples/spacecraft/scripted.esl", &AnalysisOptions::default());
     compare("../../../examples/spacecraft/failures.svg", &render_graph(&table, "scripted.esl"));

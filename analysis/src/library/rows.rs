@@ -187,7 +187,6 @@ const TOTAL: &[&str] = &[
     "%NOTED-VALUE",
     "%CALL-GUARDED",
     "%NOTE-CLEANUP",
-    "%BEGIN-CRITICAL",
     "%END-CRITICAL",
     "%DEFINE-CAUSE",
     "%DEFINE-PROPERTY",
@@ -359,12 +358,12 @@ pub(crate) fn function_positions(name: &str) -> &'static [usize] {
 /// Returns the row of a function.
 pub(crate) fn find(name: &str) -> LibraryRow {
     let causes = FAILING.iter().find(|(known, _)| *known == name).map_or(&[][..], |(_, causes)| *causes);
-    let mistakes = if TOTAL.contains(&name) {
+    let mistakes = if name == "%BEGIN-CRITICAL" {
+        CRITICAL
+    } else if TOTAL.contains(&name) {
         0
     } else if COMPUTING.contains(&name) {
         TYPE | ARITHMETIC
-    } else if matches!(name, "%BEGIN-CRITICAL") {
-        CRITICAL
     } else if matches!(name, "%LOGICAL-VALUE") {
         NAME
     } else {

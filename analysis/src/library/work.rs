@@ -27,7 +27,8 @@ impl ValueFlow<'_> {
                 let Some(function) = call.argument(0) else { return true };
                 let work = self.begin(spot, 0, TaskKind::Spawned, function);
                 self.add(call.value, FlowValue::Work(work));
-                if !self.is_absent(call, 3) && self.has_option(spot, "BUDGET") {
+                let form = &self.forms.forms[spot.form as usize];
+                if !self.is_absent(call, 3) && form.spawn_option(spot.node, "BUDGET").is_some() {
                     let name = self.name(&Symbol::keyword("BUDGET-EXHAUSTED"));
                     self.note(spot, NodeEffect::Limit(work, name));
                 }
@@ -218,20 +219,6 @@ impl ValueFlow<'_> {
         };
         form.core.nodes[..spot.node.index()].iter().any(|node| match &node.kind {
             NodeKind::If(test, then, _) => is_test(*test) && is_inside(*then),
-            _ => false,
-        })
-    }
-
-    /// Whether a keyword stands in the form of a spot.
-    fn has_option(&self, spot: Spot, keyword: &str) -> bool {
-        let form = &self.forms.forms[spot.form as usize];
-        let around = form.core.nodes[spot.node.index()].span;
-        let is_it =
-            |item: &NodeId| form.symbol(*item).is_some_and(|one| one.is_keyword() && one.name() == keyword);
-        form.core.nodes.iter().any(|node| match &node.kind {
-            NodeKind::Call(Callee::Builtin(Builtin::List), items) => {
-                around.contains(node.span) && items.iter().any(is_it)
-            }
             _ => false,
         })
     }

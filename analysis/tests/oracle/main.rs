@@ -2,6 +2,9 @@
 //! procedure is in the table of the program.
 #![allow(clippy::print_stderr, reason = "long runs show their findings at once")]
 
+mod generated;
+mod generator;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
