@@ -1,4 +1,5 @@
-//! Findings of explorations, as marks in the texts: `eslvm explore --findings FILE` has written them.
+//! Findings of explorations, as marks in the texts: `eslvm explore --findings FILE` or `eslvm test --findings
+//! FILE` has written them.
 //!
 //! Guarantees: a finding is shown only in a text that is as it was when the program was explored: as it is
 //! stored, and stored no later than the findings. Not here: when to look ([`super::check`]).
@@ -136,6 +137,7 @@ impl FindingMarker<'_> {
     fn mark(&mut self, finding: &Json, folder: &Path, program: &str) {
         let kind = if finding.get("fragile").is_some() { "fragile" } else { "finding" };
         let Some(what) = finding[kind].as_str() else { return };
+        let command = if finding.get("test").is_some() { "eslvm test" } else { "eslvm explore" };
         let steps = self.steps(finding, folder);
         let Some(main) = steps.iter().rposition(|step| step.is_switch).or(steps.len().checked_sub(1)) else {
             return;
@@ -150,7 +152,7 @@ impl FindingMarker<'_> {
             range: at.range,
             severity: Some(severity),
             code: Some(NumberOrString::String(kind.into())),
-            source: Some("eslvm explore".into()),
+            source: Some(command.into()),
             message,
             ..ShownDiagnostic::default()
         };
@@ -158,7 +160,10 @@ impl FindingMarker<'_> {
             if number == main {
                 let report = finding["report"].as_str().unwrap_or_default();
                 let schedule = finding["schedule"].as_str().unwrap_or_default();
-                let again = format!("again: eslvm run --schedule {schedule} {program}");
+                let again = match finding["again"].as_str() {
+                    Some(command) => format!("again: {command}"),
+                    None => format!("again: eslvm run --schedule {schedule} {program}"),
+                };
                 let lines = [what, &step.text, report.trim_end(), &again];
                 let lines: Vec<&str> = lines.into_iter().filter(|line| !line.is_empty()).collect();
                 let mark = shown(DiagnosticSeverity::WARNING, &step.at.1, lines.join("\n"));

@@ -126,7 +126,7 @@ impl Tests {
         Ok(match verdict.map_err(|error| of_error(py, error))? {
             Verdict::Passed => (None, String::new()),
             Verdict::PassedAll(how) => (None, how),
-            Verdict::Failed { why, output } => (Some(why), output),
+            Verdict::Failed { why, output, .. } => (Some(why), output),
         })
     }
 }

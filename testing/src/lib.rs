@@ -13,7 +13,7 @@
 //! let tests = list(&program, &setup)?;
 //! let run = |at: usize| run_test(&program, &tests[at], 0, &setup);
 //! assert_eq!(run(0)?, Verdict::Passed);
-//! let Verdict::Failed { why, output } = run(1)? else { panic!() };
+//! let Verdict::Failed { why, output, .. } = run(1)? else { panic!() };
 //! assert_eq!(why, "a check did not hold");
 //! assert_eq!(output, "(> (NOW) 200) is false.\n  (NOW) is 100.0\n");
 //! # Ok::<(), esl::Error>(())
@@ -22,6 +22,7 @@
 
 pub mod coverage;
 pub mod explore;
+mod failing;
 pub mod inject;
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -40,6 +41,7 @@ use esl_vm::vm::{Config, Vm};
 
 use crate::coverage::Coverage;
 use crate::explore::{ExplorationScope, grains, states_of};
+pub use crate::failing::FailingSchedule;
 
 /// Statuses with which the library's `%run-test` ends a run.
 const ALL_HELD: u8 = 100;
@@ -118,7 +120,16 @@ pub enum Verdict {
         why: String,
         /// Its output, reports of failures and checks included.
         output: String,
+        /// The schedule under which it does, if an exploration has found one.
+        schedule: Option<Box<FailingSchedule>>,
     },
+}
+
+impl Verdict {
+    /// Returns the verdict on a test that fails, under this schedule if there is one.
+    fn failed(why: impl Into<String>, output: String, schedule: Option<Box<FailingSchedule>>) -> Verdict {
+        Verdict::Failed { why: why.into(), output, schedule }
+    }
 }
 
 /// The output of a machine.
@@ -298,20 +309,24 @@ fn explore_if_small(
             let ended = program::end(&mut machine, main, outcome);
             let again = verdict(ended, || written.text());
             return Ok(match again {
-                Verdict::Failed { why, output } => {
-                    Some(Verdict::Failed { why: format!("under a schedule, {why} ({scope})"), output })
+                Verdict::Failed { why, output, .. } => {
+                    let schedule = FailingSchedule::of_ending(&settings, &ending.choices);
+                    let why = format!("under a schedule, {why} ({scope})");
+                    Some(Verdict::failed(why, output, Some(schedule)))
                 }
                 _ => None,
             });
         }
-        if found.endless.is_some() {
+        if let Some(choices) = &found.endless {
             let why = format!("a schedule leads to where it never ends ({scope})");
-            return Ok(Some(Verdict::Failed { why, output: String::new() }));
+            let schedule = FailingSchedule::of_endless(&settings, choices);
+            return Ok(Some(Verdict::failed(why, String::new(), Some(schedule))));
         }
         if let Some(unmet) = found.unmet.first() {
             let name = name_of_unmet(program, test, &settings, unmet, setup)?;
             let why = format!("{name} {NEVER_COMES_TRUE} ({scope})");
-            return Ok(Some(Verdict::Failed { why, output: String::new() }));
+            let schedule = FailingSchedule::of_livelock(&settings, &unmet.schedule);
+            return Ok(Some(Verdict::failed(why, String::new(), Some(schedule))));
         }
         if found.limit.is_some() || found.livelock.is_some() {
             return Ok(None);
@@ -346,12 +361,12 @@ fn explore(program: &Program, test: &Test, options: ExploreOptions, setup: &Setu
         return Ok(verdict);
     }
     let Some(marked) = &setup.with_points else {
-        let why = "`:strict` needs the source of the program".into();
-        return Ok(Verdict::Failed { why, output: String::new() });
+        return Ok(Verdict::failed("`:strict` needs the source of the program", String::new(), None));
     };
     Ok(match (explore_grains(marked, test, options, setup)?, verdict) {
-        (Verdict::Failed { why, output }, _) => {
-            Verdict::Failed { why: format!("with switches before each use of a shared place, {why}"), output }
+        (Verdict::Failed { why, output, schedule }, _) => {
+            let why = format!("with switches before each use of a shared place, {why}");
+            Verdict::failed(why, output, schedule)
         }
         (Verdict::PassedAll(strictly), Verdict::PassedAll(how)) => {
             Verdict::PassedAll(format!("{how}; not fragile: {strictly}"))
@@ -377,20 +392,30 @@ fn explore_grains(
             Settings { grain, timers, aborts, crashes, states, strict, output: false, ..Settings::default() };
         let found = explore_at(program, test, &settings, setup, &mut || true)?;
         let scope = ExplorationScope::new(program, &settings, &found);
-        let failed = |why: &str, output| Verdict::Failed { why: format!("{why} ({scope})"), output };
+        let failed =
+            |why: &str, output, schedule| Verdict::failed(format!("{why} ({scope})"), output, schedule);
         let badly = found.endings.into_iter().find(|ending| ending.what != Verdict::Passed);
-        verdict = match badly.map(|ending| ending.what) {
-            Some(Verdict::Failed { why, output }) => failed(&format!("under a schedule, {why}"), output),
+        verdict = match badly.map(|ending| (ending.what, ending.choices)) {
+            Some((Verdict::Failed { why, output, .. }, choices)) => {
+                let schedule = FailingSchedule::of_ending(&settings, &choices);
+                failed(&format!("under a schedule, {why}"), output, Some(schedule))
+            }
             _ if let Some(unmet) = found.unmet.first() => {
                 let name = name_of_unmet(program, test, &settings, unmet, setup)?;
-                failed(&format!("{name} {NEVER_COMES_TRUE}"), String::new())
+                let schedule = FailingSchedule::of_livelock(&settings, &unmet.schedule);
+                failed(&format!("{name} {NEVER_COMES_TRUE}"), String::new(), Some(schedule))
             }
-            _ if found.endless.is_some() => failed("a schedule leads to where it never ends", String::new()),
-            _ if found.livelock.is_some() => {
-                failed("tasks can go on for ever, though each has its turns", String::new())
+            _ if let Some(choices) = &found.endless => {
+                let schedule = FailingSchedule::of_endless(&settings, choices);
+                failed("a schedule leads to where it never ends", String::new(), Some(schedule))
+            }
+            _ if let Some(livelock) = &found.livelock => {
+                let schedule = FailingSchedule::of_livelock(&settings, livelock);
+                let why = "tasks can go on for ever, though each has its turns";
+                failed(why, String::new(), Some(schedule))
             }
             _ if found.limit.is_some() => {
-                failed("not proved: schedules are left that were not tried", unproved(&verdict))
+                failed("not proved: schedules are left that were not tried", unproved(&verdict), None)
             }
             _ => Verdict::PassedAll(match scope.why_not_complete() {
                 None => format!("all schedules, {scope}"),
@@ -452,5 +477,5 @@ fn verdict(ended: Ended, output: impl FnOnce() -> String) -> Verdict {
         Ended::Deadlocked => "it waits for an event that cannot occur".into(),
         Ended::Signalled(signal) => format!("it was ended by the signal {}", signal.number()),
     };
-    Verdict::Failed { why, output: output() }
+    Verdict::Failed { why, output: output(), schedule: None }
 }

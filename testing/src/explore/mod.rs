@@ -164,10 +164,21 @@ pub fn shortest(
     choices: &[u32],
     prepare: Prepare<'_>,
 ) -> Result<Vec<u32>, Error> {
-    let end = |choices: &[u32]| follow_with(program, settings, choices, prepare);
-    let is_same = |other: &Behaviour, wanted: &Behaviour| {
-        (&other.ended, &other.errors) == (&wanted.ended, &wanted.errors)
-    };
+    shortest_by(choices, &mut |choices| {
+        let Behaviour { ended, errors, .. } = follow_with(program, settings, choices, prepare)?;
+        Ok((ended, errors))
+    })
+}
+
+/// Returns choices with as few as possible of those that are not the first one, without which a run along
+/// them ends as before, as `end` describes it.
+///
+/// # Errors
+/// Those of `end`.
+pub(crate) fn shortest_by<T: PartialEq, E>(
+    choices: &[u32],
+    end: &mut dyn FnMut(&[u32]) -> Result<T, E>,
+) -> Result<Vec<u32>, E> {
     let wanted = end(choices)?;
     let mut best = choices.to_vec();
     let mut runs = 0;
@@ -181,7 +192,7 @@ pub fn shortest(
         let shorter = [without(&[]), without(&best[at + 1..])];
         for candidate in shorter {
             runs += 1;
-            if is_same(&end(&candidate)?, &wanted) {
+            if end(&candidate)? == wanted {
                 best = candidate;
                 break;
             }

@@ -132,7 +132,7 @@ pub enum Fairness {
 }
 
 /// Settings of an exploration.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Where points are.
     pub grain: Grain,

@@ -458,7 +458,7 @@ fn findings_of_explorations_are_marked() {
     folder.file("count.findings.json", found.to_string());
     folder.file("broken.findings.json", "[");
     let changed = json!({ "uri": uri(&folder.join("count.findings.json")), "type": 1 });
-    editor.tell("workspace/didChangeWatchedFiles", json!({ "changes": [changed] }));
+    editor.tell("workspace/didChangeWatchedFiles", json!({ "changes": [&changed] }));
     let told = editor.diagnostics(&main, |told| told.len() == 3);
     let mark = told.iter().find(|mark| mark["severity"] == 2).expect("one is a warning");
     assert_eq!(mark["range"]["start"], json!({ "line": 2, "character": 15 }), "{mark}");
@@ -471,6 +471,20 @@ fn findings_of_explorations_are_marked() {
     let related = mark["relatedInformation"].as_array().expect("the steps are related");
     let messages: Vec<&str> = related.iter().filter_map(|step| step["message"].as_str()).collect();
     assert_eq!(messages, ["LEFT: reads *SEEN* = 0", "LEFT: has to stop before", "RIGHT: sets *SEEN* to 1"]);
+    // That of a test names the command that runs it.
+    let again = "eslvm test count.esl --filter COUNTING";
+    let finding = json!({ "finding": "COUNTING: a check did not hold", "test": "COUNTING", "steps": steps, "again": again });
+    let found = json!({ "folder": folder.path(), "findings": [finding] });
+    folder.file("count.findings.json", found.to_string());
+    editor.tell("workspace/didChangeWatchedFiles", json!({ "changes": [changed] }));
+    let is_of_test =
+        |told: &[Value]| told.len() == 3 && told.iter().all(|mark| mark["source"] == "eslvm test");
+    let told = editor.diagnostics(&main, is_of_test);
+    let mark = told.iter().find(|mark| mark["severity"] == 2).expect("one is a warning");
+    assert!(
+        mark["message"].as_str().is_some_and(|text| text.ends_with(&format!("again: {again}"))),
+        "{mark}"
+    );
     // The text is another one now.
     let change = json!({ "text": format!("{text}\n") });
     let document = json!({ "uri": uri(&main), "version": 2 });

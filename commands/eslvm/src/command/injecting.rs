@@ -9,11 +9,11 @@ use crate::testing::inject::InjectOptions;
 #[derive(Args)]
 pub(crate) struct InjectArguments {
     /// Run each test, or a program without tests, with each fault of its operations, and print a table
-    #[arg(long, conflicts_with_all = ["watch", "junit", "coverage"])]
+    #[arg(long, conflicts_with_all = ["watch", "junit", "findings", "coverage"])]
     pub(crate) inject: bool,
     /// Inject only the fault of this name, such as `send#3:timeout`, and print the output of the run; implies
     /// --inject
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["watch", "junit", "coverage", "pairs"])]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["watch", "junit", "findings", "coverage", "pairs"])]
     pub(crate) inject_only: Option<String>,
     /// Also inject two faults at once: at most N pairs, by default 500, of the first calls of operations
     #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "500")]

@@ -7,6 +7,7 @@ mod figures;
 mod host;
 mod injecting;
 mod options;
+mod parse;
 mod program;
 mod realtime;
 mod run;
@@ -146,6 +147,7 @@ pub fn main() -> u8 {
             jobs,
             seed,
             junit,
+            findings,
             coverage,
             full,
             no_explore,
@@ -166,6 +168,7 @@ pub fn main() -> u8 {
                     jobs,
                     seed,
                     junit,
+                    findings,
                     coverage,
                     config,
                     rights,

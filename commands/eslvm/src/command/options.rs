@@ -14,6 +14,7 @@ use super::durable::StateOptions;
 #[cfg(unix)]
 use super::host::{AgentsOptions, HostOptions};
 use super::injecting::InjectArguments;
+use super::parse::{parse_findings, parse_speed, parse_time};
 use super::state::LookOptions;
 use crate::fleet::AgentOptions;
 use crate::mcap::{McapAction, RunFileOptions};
@@ -188,6 +189,10 @@ pub(crate) enum EslvmAction {
         /// Write a report in the form of JUnit to a file
         #[arg(long, value_name = "FILE")]
         junit: Option<PathBuf>,
+        /// Write the schedules under which tests fail to a file, as JSON, for editors; its name ends in
+        /// `.findings.json`
+        #[arg(long, value_name = "FILE", value_parser = parse_findings, conflicts_with = "no_explore")]
+        findings: Option<PathBuf>,
         /// Write the coverage of lines, functions and arms to a file, in the format of lcov, and print
         /// those that were not run
         #[arg(long, value_name = "FILE")]
@@ -440,8 +445,8 @@ pub(crate) struct ExploreArguments {
     /// Write a picture of the first finding to a file: the table of the tasks, in SVG
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
-    /// Write the findings to a file, as JSON; editors show those of files that end in `.findings.json`
-    #[arg(long, value_name = "FILE")]
+    /// Write the findings to a file, as JSON, for editors; its name ends in `.findings.json`
+    #[arg(long, value_name = "FILE", value_parser = parse_findings)]
     pub(crate) findings: Option<PathBuf>,
     /// Print findings and figures as JSON, an object a line
     #[arg(long)]
@@ -477,20 +482,4 @@ pub(crate) enum TimersChoice {
     Idle,
     /// At any point
     Any,
-}
-
-/// Parses a time: a number of seconds, or a number with a unit.
-fn parse_time(text: &str) -> Result<Duration, humantime::DurationError> {
-    match text.parse() {
-        Ok(seconds) => Ok(Duration::from_secs(seconds)),
-        Err(_) => humantime::parse_duration(text),
-    }
-}
-
-/// Parses the speed of the program's clock.
-fn parse_speed(text: &str) -> Result<f64, &'static str> {
-    match text.parse() {
-        Ok(speed) if (1e-6..=1e6).contains(&speed) => Ok(speed),
-        _ => Err("expected a number from 0.000001 to 1000000"),
-    }
 }

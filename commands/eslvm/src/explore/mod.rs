@@ -25,7 +25,7 @@ mod picture;
 mod progress;
 mod random;
 mod strict;
-mod tell;
+pub(crate) mod tell;
 
 /// How to explore, and what to say of it.
 #[derive(Clone, Debug)]
@@ -319,11 +319,7 @@ impl CommandExploration<'_> {
             let told = timeline.and_then(Timeline::complete);
             told.map_err(TellError::Timeline)?;
         }
-        let last_again = match finding.repeated {
-            0 => None,
-            1 => Some("then the last switch again, and so on".to_owned()),
-            repeated => Some(format!("then the last {repeated} switches again, and so on")),
-        };
+        let last_again = tell::last_again(finding.repeated);
         if let Some(file) = options.svg.as_ref().filter(|_| number == 1) {
             let title = format!("{title}: {}", finding.what);
             let report = last_again.iter().map(String::as_str).chain(finding.errors.lines());

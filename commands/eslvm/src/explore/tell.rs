@@ -197,8 +197,17 @@ pub(super) fn cut(text: &str, most: usize) -> String {
     }
 }
 
+/// Returns the line that says which switches at the end of a schedule can be repeated for ever.
+pub(crate) fn last_again(repeated: usize) -> Option<String> {
+    match repeated {
+        0 => None,
+        1 => Some("then the last switch again, and so on".to_owned()),
+        repeated => Some(format!("then the last {repeated} switches again, and so on")),
+    }
+}
+
 /// Returns a schedule as the lines of a table.
-pub(super) fn lines(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<String> {
+pub(crate) fn lines(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<String> {
     let rows = rows(steps, forms);
     let tasks = tasks(&rows);
     let length = |text: &str| text.chars().count();
@@ -231,7 +240,7 @@ pub(super) fn lines(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Stri
 }
 
 /// Returns a schedule as JSON: an array of the lines of its table.
-pub(super) fn json(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Json> {
+pub(crate) fn json(steps: &[ScheduleStep], forms: &mut SourceForms) -> Vec<Json> {
     let rows = rows(steps, forms);
     let item = |row: &StepRow| {
         let form = row.place.as_ref().and_then(|place| forms.text(place));

@@ -2,8 +2,6 @@
 
 use std::sync::PoisonError;
 
-use esl_testing::Verdict;
-
 use super::Run;
 
 /// Returns the report, a document of XML.
@@ -16,11 +14,11 @@ pub(super) fn report(runs: &[Run<'_>]) -> String {
         let (name, file) = (escaped(&run.test.name), escaped(&run.file()));
         let time = finished.time.as_secs_f64();
         let head = format!("    <testcase name=\"{name}\" classname=\"{file}\" time=\"{time:.3}\"");
-        cases += &match &finished.verdict {
-            Verdict::Passed | Verdict::PassedAll(_) => format!("{head}/>\n"),
-            Verdict::Failed { why, output } => {
+        cases += &match finished.failure() {
+            None => format!("{head}/>\n"),
+            Some((why, output)) => {
                 failures += 1;
-                let (why, output) = (escaped(why), escaped(output));
+                let (why, output) = (escaped(why), escaped(&output));
                 format!("{head}>\n      <failure message=\"{why}\">{output}</failure>\n    </testcase>\n")
             }
         };

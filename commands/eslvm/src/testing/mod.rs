@@ -1,5 +1,6 @@
 //! `eslvm test`: the tests of several files, in several threads, and what is said of them.
 
+mod findings;
 pub mod inject;
 mod junit;
 mod watch;
@@ -7,7 +8,7 @@ mod watch;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use esl::Error;
@@ -24,6 +25,8 @@ use esl_testing::coverage::{Coverage, CoverageReport};
 use esl_testing::{Setup, Test, Verdict, list, run_and_explore, run_test};
 use esl_vm::vm::Config;
 
+use findings::ShownSchedule;
+
 /// Which tests to run, and how.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -37,6 +40,8 @@ pub struct Options {
     pub seed: Option<u64>,
     /// File for a report in JUnit's form.
     pub junit: Option<PathBuf>,
+    /// File for the schedules under which tests fail, as JSON, which editors show.
+    pub findings: Option<PathBuf>,
     /// File for the coverage of the tests, in lcov's form.
     pub coverage: Option<PathBuf>,
     /// Limits of each test.
@@ -60,14 +65,23 @@ struct Suite<'a> {
     source: Option<Source>,
     /// Whether tests are explored unasked.
     explores: bool,
+    /// The program with points, once it was needed.
+    marked: OnceLock<Option<Arc<Program>>>,
 }
 
 impl Suite<'_> {
-    /// Compiles the program with points, for tests that are explored strictly.
+    /// Returns the program with points, if its source is there.
+    fn marked(&self) -> Option<&Arc<Program>> {
+        let compile = || {
+            let source = std::slice::from_ref(self.source.as_ref()?);
+            program::compile_with_points(source, &self.setup.path).program.map(Arc::new)
+        };
+        self.marked.get_or_init(compile).as_ref()
+    }
+
+    /// Makes the program with points that of tests which are explored strictly.
     fn add_points(&mut self) {
-        let Some(source) = &self.source else { return };
-        let compiled = program::compile_with_points(std::slice::from_ref(source), &self.setup.path);
-        self.setup.with_points = compiled.program.map(Arc::new);
+        self.setup.with_points = self.marked().cloned();
     }
 }
 
@@ -83,6 +97,12 @@ impl Run<'_> {
     pub(super) fn file(&self) -> String {
         self.suite.file.display().to_string()
     }
+
+    /// Returns the command that repeats it.
+    fn again(&self, finished: &FinishedTest) -> String {
+        let seed = finished.seed.map_or(String::new(), |seed| format!(" --seed {seed}"));
+        format!("eslvm test {} --filter {}{seed}", self.file(), quoted(&self.test.name))
+    }
 }
 
 /// The outcome of a test.
@@ -91,6 +111,18 @@ pub(super) struct FinishedTest {
     /// Seed with which it has failed.
     seed: Option<u64>,
     pub(super) time: Duration,
+    /// The schedule under which it has failed.
+    shown: Option<ShownSchedule>,
+}
+
+impl FinishedTest {
+    /// Returns why it has failed, and what is said of that, if it has.
+    pub(super) fn failure(&self) -> Option<(&str, String)> {
+        let Verdict::Failed { why, output, .. } = &self.verdict else { return None };
+        let lines = self.shown.iter().flat_map(|shown| &shown.lines).map(String::as_str);
+        let lines: String = output.lines().chain(lines).flat_map(|line| [line, "\n"]).collect();
+        Some((why, lines))
+    }
 }
 
 /// Runs the tests of `paths`, files and folders, and prints what becomes of them; again and again if that is
@@ -177,7 +209,7 @@ fn run_once(paths: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
 /// The exit status, after a message.
 fn run_files(found: &TestFiles, library: &[PathBuf], options: &Options) -> Result<u8, u8> {
     let files = &found.files;
-    for output in [&options.junit, &options.coverage].into_iter().flatten() {
+    for output in [&options.junit, &options.findings, &options.coverage].into_iter().flatten() {
         command::refuse_overwriting(output, files.iter().map(PathBuf::as_path))?;
     }
     let mut suites =
@@ -215,6 +247,12 @@ fn run_files(found: &TestFiles, library: &[PathBuf], options: &Options) -> Resul
     say!("{} passed, {failed} failed", runs.len() - failed);
     if let Some(path) = &options.junit
         && let Err(error) = std::fs::write(path, junit::report(&runs))
+    {
+        complain(format_args!("{} cannot be written: {error}", path.display()));
+        return Err(USAGE);
+    }
+    if let Some(path) = &options.findings
+        && let Err(error) = findings::write(path, &runs)
     {
         complain(format_args!("{} cannot be written: {error}", path.display()));
         return Err(USAGE);
@@ -314,7 +352,7 @@ fn suite<'a>(file: &'a Path, library: &[PathBuf], options: &Options) -> Result<S
     let (config, rights) = (options.config.clone(), options.rights.clone());
     let setup = Setup { config, path, rights, coverage, is_full: options.is_full, with_points: None };
     let explores = options.explores && options.seed.is_none() && options.coverage.is_none();
-    Ok(Suite { file, program, setup, source, explores })
+    Ok(Suite { file, program, setup, source, explores, marked: OnceLock::new() })
 }
 
 fn is_wanted(test: &Test, filter: Option<&str>) -> bool {
@@ -335,7 +373,8 @@ fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
         Some(seed) => seed..seed.saturating_add(1),
         None => 0..run.test.seeds,
     };
-    let mut finished = FinishedTest { verdict: Verdict::Passed, seed: None, time: Duration::ZERO };
+    let mut finished =
+        FinishedTest { verdict: Verdict::Passed, seed: None, time: Duration::ZERO, shown: None };
     for seed in seeds {
         let found = match run.test.may_explore && run.suite.explores {
             true => run_and_explore(&run.suite.program, &run.test, &run.suite.setup),
@@ -343,7 +382,8 @@ fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
                 .map(|verdict| (verdict, run.test.explores.is_some())),
         };
         let (verdict, is_explored) = found.unwrap_or_else(|error| {
-            (Verdict::Failed { why: "it cannot be begun".into(), output: error.to_string() }, false)
+            let (why, output) = ("it cannot be begun".into(), error.to_string());
+            (Verdict::Failed { why, output, schedule: None }, false)
         });
         let seed = (!is_explored).then_some(seed);
         match verdict {
@@ -355,7 +395,17 @@ fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
             }
         }
     }
-    FinishedTest { time: start.elapsed(), ..finished }
+    let shown = shown(run, &finished.verdict);
+    FinishedTest { time: start.elapsed(), shown, ..finished }
+}
+
+/// Returns the schedule under which a test has failed, if there is one. It is left out if it cannot be
+/// followed for want of memory.
+fn shown(run: &Run<'_>, verdict: &Verdict) -> Option<ShownSchedule> {
+    let Verdict::Failed { schedule: Some(schedule), .. } = verdict else { return None };
+    let suite = run.suite;
+    let program = suite.marked().map_or(&suite.program, |marked| &**marked);
+    ShownSchedule::of(schedule, program, &run.test, &suite.setup).ok()
 }
 
 /// Prints what became of the tests from `told` on that have ended, in the order of the files.
@@ -374,20 +424,20 @@ fn tell(runs: &[Run<'_>], told: &mut usize, options: &Options) {
 /// Returns the lines that say what became of a test.
 fn text(run: &Run<'_>, finished: &FinishedTest, options: &Options) -> String {
     let Test { name, seeds, .. } = &run.test;
-    let (why, output) = match &finished.verdict {
+    match &finished.verdict {
         Verdict::Passed if options.seed.is_none() && *seeds > 1 => {
             return format!("  passed  {name}, {seeds} seeds\n");
         }
         Verdict::Passed => return format!("  passed  {name}\n"),
         Verdict::PassedAll(how) => return format!("  passed  {name}, {how}\n"),
-        Verdict::Failed { why, output } => (why, output),
-    };
+        Verdict::Failed { .. } => {}
+    }
+    let (why, output) = finished.failure().unwrap_or_default();
     let seed = finished.seed.map_or(String::new(), |seed| format!(", seed {seed}"));
     let mut text = format!("  FAILED  {name}{seed}: {why}\n");
     // Writing to a string does not fail.
     output.lines().for_each(|line| _ = writeln!(text, "          {line}"));
-    let again = finished.seed.map_or(String::new(), |seed| format!(" --seed {seed}"));
-    _ = writeln!(text, "          again: eslvm test {} --filter {}{again}", run.file(), quoted(name));
+    _ = writeln!(text, "          again: {}", run.again(finished));
     text
 }
 

@@ -196,16 +196,38 @@ fn small_tests_of_several_tasks_are_explored_unasked() {
           (is (= *n* 2)))
         (deftest left-out :explore nil (task-net (a (update)) (b (update))) (is (= *n* 2)))";
     let folder = Folder::with("testing-unasked", &[("tests.esl", text)]);
-    let (status, output) = test(&folder, &["tests.esl"]);
+    let (status, output) = test(&folder, &["tests.esl", "--findings", "sums.findings.json"]);
     assert_eq!(status, Some(1), "{output}");
     for line in [
         "  passed  ALONE\n  FAILED  LUCKY: under a schedule, a check did not hold (grain variables, ",
+        "has to stop before",
         "again: eslvm test tests.esl --filter LUCKY\n",
         "  passed  CAREFUL, explored: complete, ",
         "  passed  LEFT-OUT\n",
         "3 passed, 1 failed\n",
     ] {
         assert!(output.contains(line), "{line}: {output}");
+    }
+    // The same schedule for editors.
+    let found = std::fs::read(folder.join("sums.findings.json")).expect("it is written");
+    let found: serde_json::Value = serde_json::from_slice(&found).expect("it is JSON");
+    let findings = found["findings"].as_array().expect("it has findings");
+    assert_eq!((findings.len(), &findings[0]["test"]), (1, &"LUCKY".into()), "{found}");
+    assert_eq!(findings[0]["again"], "eslvm test tests.esl --filter LUCKY", "{found}");
+    let steps = findings[0]["steps"].as_array().expect("it has steps");
+    let is_switch = |step: &serde_json::Value| step["stops"]["place"].as_str() == Some("tests.esl:3:36");
+    assert!(steps.iter().any(is_switch), "{found}");
+    // Without a failure under a schedule, those of before go.
+    test(&folder, &["tests.esl", "--filter", "CAREFUL", "--findings", "sums.findings.json"]);
+    let found = std::fs::read_to_string(folder.join("sums.findings.json")).expect("it is written");
+    assert!(found.contains("\"findings\":[]"), "{found}");
+    for command in [&["test"][..], &["explore"][..]] {
+        let run = process::run(
+            eslvm(command).args(["--findings", "f.txt", "tests.esl"]).current_dir(folder.path()),
+            "",
+        );
+        assert_eq!(run.status, Some(2), "{}", run.errors);
+        assert!(run.errors.contains("a name that ends in `.findings.json`"), "{}", run.errors);
     }
     let (status, output) = test(&folder, &["--no-explore", "tests.esl"]);
     assert_eq!(status, Some(0), "{output}");
