@@ -7,13 +7,14 @@ use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, Poo
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
-use super::unseen::{UnseenKind, constant, function_named, instructions, kinds_of};
+use super::named::{constant, functions_named, instructions};
+use super::unseen::{UnseenKind, kinds_of};
 
 /// Returns the number of the first form at top level beside which a task may run: those of `spawn` outlive
 /// the form that makes them, and it, or a function that it calls, may spawn.
 pub(super) fn first_late_form(module: &Module) -> usize {
     let is_spawn = |function: &ModuleFunction, instr| {
-        function_named(module, function, instr).is_some_and(|symbol| symbol == Symbol::esl("%SPAWN"))
+        functions_named(module, function, instr).contains(&Symbol::esl("%SPAWN"))
     };
     let all = module.functions.iter();
     if !all.clone().any(|function| instructions(function).any(|(_, instr)| is_spawn(function, instr))) {
@@ -53,7 +54,7 @@ pub(super) fn defines_function(instr: Instr) -> bool {
 }
 
 /// Functions that find a symbol by its name.
-const FINDING: &[&str] =
+pub(super) const FINDING: &[&str] =
     &["FIND-SYMBOL", "READ", "READ-FROM-STRING", "READ-PRESERVING-WHITESPACE", "APROPOS-LIST"];
 
 /// For each symbol, the first function that names it.
@@ -89,7 +90,11 @@ impl FirstNames {
 
 /// Returns the symbols among the constants of a function.
 fn symbols_of(module: &Module, function: &ModuleFunction) -> HashSet<Symbol> {
-    let mut open: Vec<PoolIdx> = function.constants.clone();
+    symbols_in(module, function.constants.clone())
+}
+
+/// Returns the symbols in constants.
+pub(super) fn symbols_in(module: &Module, mut open: Vec<PoolIdx>) -> HashSet<Symbol> {
     let (mut seen, mut symbols) = (HashSet::new(), HashSet::new());
     while let Some(index) = open.pop() {
         if !seen.insert(index.0) {

@@ -22,6 +22,7 @@
 mod forms;
 mod late;
 mod library;
+mod named;
 mod orders;
 mod random;
 mod unseen;
@@ -40,7 +41,7 @@ pub use forms::SourceForms;
 pub use library::function_symbol;
 pub use orders::SeenOrders;
 pub use random::{RandomFound, RandomSettings, explore_randomly};
-pub use unseen::{UnseenChange, UnseenKind, counts_signals, reads_clock, unseen_changes};
+pub use unseen::{UnseenChange, UnseenKind, counts_signals, reads_clock, reads_column, unseen_changes};
 pub use verdict::{ExplorationScope, grains};
 
 /// A run as it is seen from outside.
@@ -92,6 +93,7 @@ pub(crate) fn states_of(program: &Program, settings: &Settings) -> Settings {
     Settings {
         clock: settings.clock || reads_clock(program),
         counts: settings.counts || counts_signals(program),
+        columns: settings.columns || reads_column(program),
         ..*settings
     }
 }

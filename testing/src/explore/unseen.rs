@@ -17,12 +17,13 @@ use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::module::{Constant, Module, ModuleFunction};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::sharing::Sharing;
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
 use super::Grain;
 use super::forms::SourceForms;
-use super::late::{FirstNames, defines_function, first_late_form};
+use super::late::{FINDING, FirstNames, defines_function, first_late_form};
 use super::library;
+use super::named::{called, constant, functions_named, instructions};
 
 /// A kind of use of shared places that a grain does not see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -49,7 +50,9 @@ pub enum UnseenKind {
     Property,
     /// Of a stream that the program makes.
     Stream,
-    /// Of whatever code changes that is made while the program runs.
+    /// Reading the column of standard output, by `fresh-line`.
+    Column,
+    /// Of whatever code changes that is made while the program runs, or functions that it finds by name.
     Code,
     /// Of functions, classes and packages by forms at top level that are evaluated while tasks may run, which
     /// only grain `ticks` sees. A new function that no code before it names is none.
@@ -73,7 +76,8 @@ impl fmt::Display for UnseenKind {
             UnseenKind::Table => "changes of hash tables",
             UnseenKind::Property => "changes of properties of symbols",
             UnseenKind::Stream => "uses of streams that the program makes",
-            UnseenKind::Code => "effects of code that is made at run time",
+            UnseenKind::Column => "the column of the output, which `fresh-line` reads",
+            UnseenKind::Code => "effects of code that is made or found by name at run time",
             UnseenKind::LateDefinition => "definitions while tasks run",
             UnseenKind::Definition => "changes of functions, classes and packages",
         })
@@ -124,6 +128,7 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
     };
     let (late, writers) = (first_late_form(module), slot_writers(module));
     let named = FirstNames::of(module, late);
+    let (format, formats) = (Symbol::cl("FORMAT"), has_fill_pointers(module));
     let mut forms = SourceForms::default();
     let mut found: Vec<UnseenChange> = Vec::new();
     for (number, function) in module.functions.iter().enumerate() {
@@ -131,6 +136,9 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
         let is_toplevel = form.is_some();
         for (pc, instr) in instructions(function) {
             let mut kinds = kinds_of(module, function, instr);
+            if formats && functions_named(module, function, instr).contains(&format) {
+                kinds.push(UnseenKind::Element);
+            }
             let sets_slot = |symbol: Symbol| writers.contains(&symbol);
             if called(instr).and_then(|index| constant(module, function, index)).is_some_and(sets_slot) {
                 kinds.push(UnseenKind::Slot);
@@ -189,17 +197,6 @@ pub fn unseen_changes(program: &Program, grain: Grain) -> Vec<UnseenChange> {
     found
 }
 
-/// Returns the instructions of a function, each with its place in the code.
-pub(super) fn instructions(function: &ModuleFunction) -> impl Iterator<Item = (usize, Instr)> + '_ {
-    let mut at = 0;
-    std::iter::from_fn(move || {
-        let instr = Instr::decode(&function.code, at)?;
-        let pc = at;
-        at += instr.opcode().words();
-        Some((pc, instr))
-    })
-}
-
 /// Returns whether the program reads the clock, so that the time may decide what it does, or may do so by
 /// code that it makes while it runs.
 pub fn reads_clock(program: &Program) -> bool {
@@ -215,45 +212,21 @@ pub fn counts_signals(program: &Program) -> bool {
     may_call(program, |symbol| Builtin::named(symbol) == Some(Builtin::EventCount))
 }
 
+/// Returns whether the program may look at the column of an output.
+pub fn reads_column(program: &Program) -> bool {
+    may_call(program, |symbol| Builtin::named(symbol) == Some(Builtin::FreshLine))
+}
+
 /// Returns whether a program names a function that `is_meant`, or makes code while it runs.
 fn may_call(program: &Program, is_meant: impl Fn(&Symbol) -> bool) -> bool {
     let module = program.module();
     module.functions.iter().any(|function| {
         instructions(function).any(|(_, instr)| {
-            function_named(module, function, instr).is_some_and(|symbol| {
-                is_meant(&symbol) || kinds_of_function(&symbol).contains(&UnseenKind::Code)
-            })
+            functions_named(module, function, instr)
+                .iter()
+                .any(|symbol| is_meant(symbol) || kinds_of_function(symbol).contains(&UnseenKind::Code))
         })
     })
-}
-
-/// Returns the constant that names the function that an instruction calls or refers to.
-fn called(instr: Instr) -> Option<usize> {
-    match instr {
-        Instr::CallGlobal { symbol, .. } | Instr::TailCallGlobal { symbol, .. } => Some(symbol.0 as usize),
-        Instr::FunctionRef { symbol, .. } => Some(symbol.0 as usize),
-        _ => None,
-    }
-}
-
-/// Returns the name of the function that an instruction calls or refers to.
-pub(super) fn function_named(module: &Module, function: &ModuleFunction, instr: Instr) -> Option<Symbol> {
-    let constant = |index: usize| constant(module, function, index);
-    match instr {
-        Instr::CallBuiltin { builtin: number, .. } | Instr::TailCallBuiltin { builtin: number, .. } => {
-            Some(Builtin::from_number(number.0)?.symbol())
-        }
-        Instr::LoadConst { constant: index, .. } => constant(index.0 as usize),
-        instr => constant(called(instr)?),
-    }
-}
-
-/// Returns the symbol that is a constant of a function.
-pub(super) fn constant(module: &Module, function: &ModuleFunction, index: usize) -> Option<Symbol> {
-    match module.constants.get(function.constants.get(index)?.0 as usize)? {
-        Constant::Symbol(symbol) => Some(symbol.clone()),
-        _ => None,
-    }
 }
 
 /// Returns the kinds of changes that an instruction makes.
@@ -270,7 +243,7 @@ pub(super) fn kinds_of(module: &Module, function: &ModuleFunction, instr: Instr)
             }]
         }
         Some(Sharing { place, is_change: true }) => kind_of_place(place).into_iter().collect(),
-        _ => function_named(module, function, instr).map_or(Vec::new(), |symbol| kinds_of_function(&symbol)),
+        _ => functions_named(module, function, instr).iter().flat_map(kinds_of_function).collect(),
     }
 }
 
@@ -295,6 +268,12 @@ fn kinds_of_function(symbol: &Symbol) -> Vec<UnseenKind> {
     if !symbol.is_in(CL_PACKAGE) && !symbol.is_in(ESL_PACKAGE) {
         return Vec::new();
     }
+    if FINDING.contains(&symbol.name()) {
+        return vec![UnseenKind::Code];
+    }
+    if Builtin::named(symbol) == Some(Builtin::FreshLine) {
+        return vec![UnseenKind::Column];
+    }
     if let Some(builtin) = Builtin::named(symbol) {
         return kind_of_place(builtin.info().shares).into_iter().collect();
     }
@@ -316,6 +295,15 @@ fn slot_writers(module: &Module) -> HashSet<Symbol> {
     let writers = module.functions.iter().filter(sets_slot);
     let name = |function: &ModuleFunction| library::function_symbol(module, function.name?);
     writers.filter_map(name).filter(|symbol| symbol.name().starts_with("(SETF ")).collect()
+}
+
+/// Returns whether a program may make arrays with fill pointers: `format` appends to strings of this kind.
+fn has_fill_pointers(module: &Module) -> bool {
+    let is_meant = |constant: &Constant| match constant {
+        Constant::Symbol(symbol) => symbol.is_in(KEYWORD_PACKAGE) && symbol.name() == "FILL-POINTER",
+        _ => false,
+    };
+    module.constants.iter().any(is_meant)
 }
 
 /// Returns the source, line and column of an instruction.
@@ -364,6 +352,10 @@ mod tests {
             ("(defvar *h* (make-hash-table)) (incf (gethash 1 *h* 0))", &[Table]),
             ("(defvar *h* (make-hash-table)) (remhash 1 *h*)", &[Table]),
             ("(defun note () (setf (get 'robot 'state) 1)) (note)", &[Property]),
+            ("(defvar *s* (make-array 9 :fill-pointer 0)) (format *s* \"a\")", &[Element]),
+            ("(setf (readtable-case *readtable*) :preserve)", &[Slot]),
+            ("(print (list (fresh-line)))", &[Column]),
+            ("(format t \"~&a\")", &[]),
             ("(eval (list 'print 1))", &[Code]),
             ("(defun f () 1) (defclass tank () ()) (defmethod level ((tank tank)) 1)", &[]),
             ("(defun f () (setf (symbol-function 'g) (lambda () 1)))", &[Definition]),
@@ -374,7 +366,11 @@ mod tests {
             ("(spawn (f)) (defun f () 1)", &[LateDefinition]),
             ("(spawn (funcall 'f)) (defun f () 1)", &[LateDefinition]),
             ("(spawn (apply (second '((f) f)) nil)) (defun f () 1)", &[LateDefinition]),
-            ("(spawn (funcall (read-from-string \"f\"))) (defun f () 1)", &[LateDefinition]),
+            ("(spawn (funcall (read-from-string \"f\"))) (defun f () 1)", &[Code, LateDefinition]),
+            ("(print (funcall (find-symbol \"CAR\" \"CL\") nil))", &[Code]),
+            ("(defvar *ways* '((:put . rplaca))) (funcall (cdr (assoc :put *ways*)) (list 1) 2)", &[Pair]),
+            ("(mapc (lambda (way) (funcall way (list 1) 2)) #(rplaca))", &[Pair]),
+            ("(print '(delete open))", &[]),
             ("(defun go-on () (spawn (f))) (defun f () 1) (go-on)", &[]),
             ("(defun go-on () (spawn (f))) (go-on) (defun f () 1)", &[LateDefinition]),
             ("(print (mapcar (lambda (x) (spawn x)) '(f))) (defun f () 1)", &[LateDefinition]),

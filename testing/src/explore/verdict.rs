@@ -32,6 +32,8 @@ pub struct ExplorationScope {
     pub aborts: u32,
     /// Most restarts of a schedule, which interrupt calls.
     pub crashes: u32,
+    /// Whether states were one that differ by which of several like tasks is which.
+    pub symmetry: bool,
     /// Whether the program deals with restarts, by name.
     pub has_restarts: bool,
     /// Changes of the program that the grain does not see.
@@ -52,6 +54,7 @@ impl ExplorationScope {
             timers: settings.timers,
             aborts: settings.aborts,
             crashes: settings.crashes,
+            symmetry: settings.symmetry,
             has_restarts: deals_with_restarts(program),
             unseen: unseen_changes(program, settings.grain),
             limit: found.limit,
@@ -113,6 +116,9 @@ impl fmt::Display for ExplorationScope {
         }
         if self.crashes > 0 {
             write!(f, ", crashes {}", self.crashes)?;
+        }
+        if self.symmetry {
+            f.write_str(", symmetry")?;
         }
         write!(f, "; {states}, {runs}")
     }

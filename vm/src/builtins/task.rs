@@ -115,6 +115,7 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = expect_task(vm, arguments[0])?;
     let Some(index) = event::task_index(&vm.heap, task) else { return Ok(Value::NIL) };
+    vm.scheduler.points.sees_numbers = true;
     let number = vm.scheduler.find(index).map_or(TaskNumber::NONE, |task| task.number);
     let owner = match report::number_of_owner(vm, task) {
         0 => Value::NIL,
@@ -180,6 +181,7 @@ pub(super) fn all_tasks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if vm.scheduler.tasks.places() > LIMIT {
         return Err(Exit::Slowly);
     }
+    vm.scheduler.points.sees_order = true;
     let mut tasks: Vec<(TaskNumber, Value)> = Vec::new();
     for index in 0..vm.scheduler.tasks.places() {
         tasks.extend(listed_task(&vm.scheduler, index, arguments[0].is_true()));
@@ -194,6 +196,7 @@ pub(super) fn tasks_from(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [place, hidden] = exactly(arguments);
     let Some(place) = place.as_index() else { return vm.exchange.type_error(place, "UNSIGNED-BYTE") };
     let end = vm.scheduler.tasks.places().min(place.saturating_add(LIMIT));
+    vm.scheduler.points.sees_order = true;
     let mut objects = Vec::new();
     for index in place..end {
         objects.extend(listed_task(&vm.scheduler, index, hidden.is_true()).map(|(_, object)| object));

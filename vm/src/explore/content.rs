@@ -2,6 +2,8 @@
 //! calls content.
 
 use super::fingerprint::{NamedSymbol, Walk};
+use esl_host::Output;
+
 use crate::compiler::Compilations;
 use crate::heap::Heap;
 use crate::heap::layout::SymbolObject;
@@ -62,6 +64,13 @@ impl VisitScheduler for Walk<'_> {
         let mut tasks: Vec<&Task> = all.filter(|task| is_strict || task.state != TaskState::Ended).collect();
         tasks.sort_unstable_by_key(|task| task.number);
         self.word(tasks.len() as u64);
+        if !is_strict && scheduler.points.has_numbers {
+            self.word(scheduler.counts.made);
+            tasks.iter().for_each(|task| self.word(task.number.0));
+        }
+        if !is_strict && scheduler.points.has_symmetry {
+            self.put_in_order_of_likeness(&mut tasks);
+        }
         for task in &tasks {
             // All tasks first, so that their numbers are their places in this order.
             self.value(task.object);
@@ -279,6 +288,10 @@ impl VisitOutside for Walk<'_> {
     fn console(&mut self, outside: &Outside) {
         self.course(&outside.console);
         self.word(outside.console.noted());
+        if !self.is_strict && self.vm.scheduler.points.has_columns {
+            let columns = [Output::Standard, Output::Error].map(|output| outside.console.column(output));
+            columns.into_iter().for_each(|column| self.word(column as u64));
+        }
     }
 
     fn operations(&mut self, outside: &Outside) {

@@ -68,6 +68,8 @@ pub(super) struct Fingerprints {
     /// The live registers, by the digest of the code.
     live: CopyOnWrite<GivenMap<Digest, Rc<Live>>>,
     numbers: ObjectNumbers,
+    /// Digest of the order in which the last walk has visited the tasks, if like ones can be exchanged.
+    pub(super) order: u64,
     /// Room for the objects that a walk meets.
     met: Vec<Value>,
 }
@@ -255,8 +257,13 @@ impl VisitCourse for Walk<'_> {
 }
 
 impl Walk<'_> {
-    fn heap(&self) -> &Heap {
+    pub(super) fn heap(&self) -> &Heap {
         &self.vm.heap
+    }
+
+    /// Notes the order in which tasks are visited.
+    pub(super) fn note_order(&mut self, order: u64) {
+        self.known.order = order;
     }
 
     pub(super) fn word(&mut self, word: u64) {
@@ -352,7 +359,7 @@ impl Walk<'_> {
     /// Whether a word in a register is the return address of a call that is over: another one in each
     /// machine. Those of calls under way are known by the places of their frames. A program that has
     /// computed just such a number is as unlikely as two states with one fingerprint.
-    fn is_return_address(&self, v: Value) -> bool {
+    pub(super) fn is_return_address(&self, v: Value) -> bool {
         let bits = v.bits();
         bits > u64::from(u32::MAX) && bits.is_multiple_of(4) && self.heap().place(bits as usize) != 0
     }
@@ -488,7 +495,7 @@ impl Walk<'_> {
     }
 
     /// Returns the digest of a symbol of a package; `None` for another symbol.
-    fn symbol(&mut self, v: Value) -> Option<Digest> {
+    pub(super) fn symbol(&mut self, v: Value) -> Option<Digest> {
         if let Some(&digest) = self.known.codes.get(&v.bits()) {
             return Some(digest);
         }
@@ -571,7 +578,7 @@ impl Walk<'_> {
     }
 
     /// Returns the digest of the code of a function: for one of the library its number.
-    fn code_of_function(&mut self, function: Value) -> Digest {
+    pub(super) fn code_of_function(&mut self, function: Value) -> Digest {
         match image_origin(self.heap(), function) {
             Some((image, number)) => Digest(image as u64, u64::from(number)),
             None => self.heap().function_code(function).map_or(Digest::default(), |code| self.code(code)),

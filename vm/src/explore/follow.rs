@@ -129,6 +129,10 @@ pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     // At a tick a task may hold a time that the library has read, such as the deadline of a sleep; relative
     // times do not tell whether that has passed.
     vm.scheduler.points.has_counts = settings.counts;
+    (vm.scheduler.points.sees_numbers, vm.scheduler.points.sees_order) = (false, false);
+    vm.scheduler.points.has_columns = settings.columns;
+    vm.scheduler.points.has_numbers = settings.numbers;
+    vm.scheduler.points.has_symmetry = settings.symmetry && !settings.numbers;
     vm.scheduler.points.has_clock = settings.clock || settings.grain == Grain::Ticks;
     vm.config.slice = match settings.grain {
         Grain::Changes | Grain::Reads => settings.turn,

@@ -30,8 +30,8 @@ use std::collections::{HashMap, HashSet};
 
 use esl_bytecode::symbol::Symbol;
 
-use super::Settings;
 use super::digest::Digest;
+use super::{Exploration, Settings};
 use crate::fused::unfused;
 use crate::interp::frames::Frames;
 use crate::interp::start::first_code_of;
@@ -142,6 +142,10 @@ pub(super) struct ShownPoints {
     pub(super) needs_all: bool,
     pub(super) places: Vec<TickPlace>,
     pub(super) variables: Vec<Symbol>,
+    /// Whether the program sees the numbers of tasks, and states do not differ by them.
+    pub(super) numbers: bool,
+    /// Whether the program sees the order of tasks, and like ones are exchanged.
+    pub(super) order: bool,
     requests: Vec<TickPlace>,
     reached: Vec<KindOfTask>,
     targets: Vec<KindOfTask>,
@@ -152,6 +156,8 @@ impl ShownPoints {
     /// Adds what another run has shown.
     pub(super) fn add(&mut self, other: ShownPoints) {
         self.needs_all |= other.needs_all;
+        self.numbers |= other.numbers;
+        self.order |= other.order;
         self.places.extend(other.places);
         self.variables.extend(other.variables);
         self.requests.extend(other.requests);
@@ -164,7 +170,8 @@ impl ShownPoints {
     pub(super) fn is_nothing(&self) -> bool {
         let has_requests = !(self.requests.is_empty() && self.reached.is_empty() && self.targets.is_empty());
         let is_empty = self.places.is_empty() && !has_requests;
-        is_empty && self.variables.is_empty() && !self.needs_all && !self.timers
+        let has_bits = self.needs_all || self.timers || self.numbers || self.order;
+        is_empty && self.variables.is_empty() && !has_bits
     }
 }
 
@@ -270,12 +277,22 @@ impl Searches {
         (self.settings, self.needed.clone())
     }
 
+    /// Returns whether a search that was not interrupted is the last. One that exchanges tasks does not judge
+    /// of schedules that go on for ever; if there are such, another search follows.
+    pub(super) fn is_last<T>(&mut self, found: &Exploration<T>) -> bool {
+        let is_last = !self.settings.symmetry || !found.has_cycle || found.limit.is_some();
+        self.settings.symmetry &= is_last;
+        is_last
+    }
+
     /// Takes in what the last search has shown.
     pub(super) fn learn(&mut self, shown: ShownPoints) {
         self.count += 1;
         if shown.needs_all || self.count > SEARCHES {
             self.settings = self.settings.with_all_points();
         }
+        self.settings.numbers |= shown.numbers;
+        self.settings.symmetry &= !(shown.numbers || shown.order);
         self.needed.places.extend(shown.places);
         self.needed.variables.extend(shown.variables);
         self.needed.requests.extend(shown.requests);

@@ -10,9 +10,10 @@
 //! search        the tree of choices, and the states found     set       the states, by fingerprint
 //! trace         one run of the search, and taking in what it has come by
 //! worker        this thread, or several, among which the runs are divided
-//! keep          returning to places of that tree
+//! keep          returning to places of that tree                       outcome  the results of a search
 //! left_out      points that make no difference, and what shows that they do
 //! livelock      ways round that are fair to all
+//! symmetry      tasks that can be exchanged
 //! random        runs by random priorities
 //! ```
 //!
@@ -67,11 +68,13 @@ mod left_out;
 mod live;
 mod livelock;
 mod numbers;
+mod outcome;
 mod point;
 mod random;
 mod search;
 mod set;
 mod step;
+mod symmetry;
 mod tasks;
 #[cfg(test)]
 mod tests;
@@ -86,6 +89,7 @@ pub use crate::schedule::Grain;
 use crate::vm::Vm;
 pub use follow::FollowedRun;
 use left_out::{Searches, ShownPoints};
+pub use outcome::{Exploration, ExploredEnding, Livelock, SearchLimit, SearchProgress, UnmetCondition};
 pub use random::{RandomRun, RandomSchedule};
 use search::Search;
 pub use step::{ScheduleEvent, ScheduleStep, StandingTask, Switch, TellStep};
@@ -165,6 +169,15 @@ pub struct Settings {
     pub clock: bool,
     /// Whether states also differ by how often each event was signalled, because the program counts signals.
     pub counts: bool,
+    /// Whether states also differ by the columns of the outputs, because the program looks at one.
+    pub columns: bool,
+    /// Whether states also differ by the numbers of tasks. A search begins again with this when the program
+    /// has looked at one.
+    pub numbers: bool,
+    /// Whether states that differ only by which of several like tasks is which are one state. A search begins
+    /// again without this when the program has looked at the order of tasks, and to judge of schedules that
+    /// go on for ever.
+    pub symmetry: bool,
     /// The schedules without an end that count.
     pub fairness: Fairness,
     /// Most aborts of a schedule by an operator, who may ask any task of the program to end, at any point.
@@ -189,6 +202,9 @@ impl Default for Settings {
             reduce: true,
             clock: false,
             counts: false,
+            columns: false,
+            numbers: false,
+            symmetry: false,
             fairness: Fairness::Weak,
             aborts: 0,
             crashes: 0,
@@ -203,90 +219,6 @@ impl Settings {
         let clock = self.clock || self.grain == Grain::Variables;
         Settings { reduce: false, clock, ..*self }
     }
-}
-
-/// An outcome of runs.
-#[derive(Clone, Debug)]
-pub struct ExploredEnding<T> {
-    /// The caller's description.
-    pub what: T,
-    /// Choices of the first schedule that ends so.
-    pub choices: Vec<u32>,
-    /// Number of runs that ended so.
-    pub runs: usize,
-}
-
-/// The result of an exploration.
-#[derive(Clone, Debug)]
-pub struct Exploration<T> {
-    /// Number of different states at points.
-    pub states: usize,
-    /// Number of runs: one for each choice that led to a state from which something remained to be explored,
-    /// and for each ending.
-    pub runs: usize,
-    /// The ways of ending, the one with the fewest preemptions first.
-    pub endings: Vec<ExploredEnding<T>>,
-    /// Choices that lead to a state from which no schedule leads to an end, if there is one.
-    pub endless: Option<Vec<u32>>,
-    /// A schedule that goes on for ever though it is fair to all tasks, beside those that lead to a state of
-    /// `endless`, if there is one.
-    pub livelock: Option<Livelock>,
-    /// The conditions of `eventually` and `leads-to` that never become true on a schedule that goes on for
-    /// ever. Schedules that end without them have an ending of their own.
-    pub unmet: Vec<UnmetCondition>,
-    /// Whether a schedule returns to a state: then it can go on for ever, if only by treating tasks unfairly.
-    pub has_cycle: bool,
-    /// The limit that kept the search from trying everything, if one did.
-    pub limit: Option<SearchLimit>,
-}
-
-/// A schedule that returns to a state. If it has to be fair, each task that could go on all along has gone
-/// on, and time has passed if it could.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Livelock {
-    /// Choices that lead to the state, and from there back to it.
-    pub choices: Vec<u32>,
-    /// Number of the first choice on the path back.
-    pub lap: usize,
-}
-
-/// A condition that is to become true, and a schedule that goes on for ever without it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UnmetCondition {
-    /// Its number, from which [`Vm::name_of_condition`] returns its name at the end of the schedule.
-    pub condition: u32,
-    /// The schedule. The condition is false in all states of the cycle.
-    pub schedule: Livelock,
-}
-
-/// A limit that keeps a search from trying everything.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SearchLimit {
-    /// [`Settings::states`].
-    States,
-    /// [`Settings::memory`].
-    Memory,
-    /// [`Settings::switches`].
-    Switches,
-    /// [`Settings::faults`].
-    Faults,
-    /// A request of the caller to stop.
-    Asked,
-}
-
-/// How far a search has come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SearchProgress {
-    /// Number of different states so far.
-    pub states: usize,
-    /// Number of runs so far.
-    pub runs: usize,
-    /// Number of choices that are still to be tried.
-    pub open: usize,
-    /// Number of preemptions of the schedules that are tried now.
-    pub switches: usize,
-    /// Number of different endings so far.
-    pub endings: usize,
 }
 
 /// A program as a search runs it: how a machine is begun, and what is said of the end of its run.
@@ -376,7 +308,8 @@ pub fn explore_while<C, T: PartialEq + Clone, E>(
         let search = RwLock::new(Search::default());
         let mut alone = SingleWorker::new((&settings, &needed), &search, &mut subject);
         match search_by(&settings, &search, &mut alone, &mut goes_on)? {
-            Ok(found) => return Ok(found),
+            Ok(found) if searches.is_last(&found) => return Ok(found),
+            Ok(_) => {}
             Err(shown) => searches.learn(shown),
         }
     }
@@ -414,7 +347,8 @@ pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
             }
         });
         match found.expect("the last function was called")? {
-            Ok(found) => return Ok(found),
+            Ok(found) if searches.is_last(&found) => return Ok(found),
+            Ok(_) => {}
             Err(shown) => searches.learn(shown),
         }
     }
@@ -494,7 +428,9 @@ fn search_by<T: PartialEq + Clone, E>(
     let stuck = ends.iter().position(|ends| !ends);
     let endless = stuck.map(|state| search.choices_to_state(state as u32));
     let (states, has_cycle) = (search.states.len(), search.has_cycle());
-    let livelock = if has_cycle { search.livelock(settings, &ends) } else { None };
-    let unmet = if has_cycle { search.unmet(settings) } else { Vec::new() };
+    // Where tasks are exchanged, a way back to a state need not be one for each of them.
+    let is_judged = has_cycle && !settings.symmetry;
+    let livelock = if is_judged { search.livelock(settings, &ends) } else { None };
+    let unmet = if is_judged { search.unmet(settings) } else { Vec::new() };
     Ok(Ok(Exploration { states, runs, endings, endless, livelock, unmet, has_cycle, limit }))
 }

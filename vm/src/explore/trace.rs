@@ -211,6 +211,7 @@ impl<'a, S: Subject> Tracer<'a, S> {
                 return Some(0);
             }
             let mut state = keeper.fingerprints.of(vm) ^ u128::from(run.has_open_action(vm));
+            let order = keeper.fingerprints.order;
             if settings.aborts > 0 {
                 state ^= u128::from(run.aborts()).wrapping_mul(ABORTS_FACTOR);
             }
@@ -231,7 +232,7 @@ impl<'a, S: Subject> Tracer<'a, S> {
             steps.push(TraceStep { state, count, tried, left, has_last, has_ways, tasks, pending, cause });
             end = if search.states.contains(state) {
                 TraceEnd::Known
-            } else if let Some(step) = claims.claim((state, run.last()), (number, steps.len() - 1)) {
+            } else if let Some(step) = claims.claim((state, run.last(), order), (number, steps.len() - 1)) {
                 TraceEnd::Joined(step)
             } else if !goes_on() {
                 TraceEnd::Stopped
@@ -248,8 +249,10 @@ impl<'a, S: Subject> Tracer<'a, S> {
         if let Some(outcome) = outcome {
             end = TraceEnd::Ended(subject.judge(&mut machine, outcome));
         }
+        let mut shown = left_out.map_or_else(ShownPoints::default, |left_out| left_out.shown);
+        shown.numbers = machine.scheduler.points.sees_numbers && !settings.numbers;
+        shown.order = machine.scheduler.points.sees_order && settings.symmetry;
         keeper.take_back(machine);
-        let shown = left_out.map_or_else(ShownPoints::default, |left_out| left_out.shown);
         Ok(RunTrace { steps, end, shown })
     }
 }

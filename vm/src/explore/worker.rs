@@ -28,8 +28,9 @@ pub(super) struct RunPlace {
 /// A step of a run of a batch: the number of the run in the batch, and that of the step.
 pub(super) type ClaimedStep = (usize, usize);
 
-/// A state, and the task that has run last: what a run does from there on follows from both.
-type Claimable = (u128, TaskNumber);
+/// A state, the task that has run last, and the order in which the fingerprint has visited the tasks: what a
+/// run does from there on follows from these.
+type Claimable = (u128, TaskNumber, u64);
 
 /// The states that the runs of a batch have come to, each with the first step that has.
 #[derive(Default)]

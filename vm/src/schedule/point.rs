@@ -103,6 +103,16 @@ pub(crate) struct Points {
     pub(crate) has_clock: bool,
     /// Whether states differ by how often events were signalled.
     pub(crate) has_counts: bool,
+    /// Whether states differ by the columns of the outputs.
+    pub(crate) has_columns: bool,
+    /// Whether states differ by the numbers of tasks.
+    pub(crate) has_numbers: bool,
+    /// Whether states that differ only by which of several like tasks is which are one state.
+    pub(crate) has_symmetry: bool,
+    /// Whether the program has looked at the number of a task.
+    pub(crate) sees_numbers: bool,
+    /// Whether the program has looked at the order of tasks.
+    pub(crate) sees_order: bool,
     /// Whether the running task may pass the point at which it stands.
     pub(crate) is_open: bool,
     /// Whether the running task has passed a point, or has done something else that other tasks can see,

@@ -59,6 +59,7 @@ pub(crate) fn run_explore(
         faults: options.faults,
         aborts: options.aborts,
         crashes: options.crashes,
+        symmetry: options.symmetry,
         output: false,
         fairness: match options.fairness {
             FairnessChoice::Weak => explore::Fairness::Weak,

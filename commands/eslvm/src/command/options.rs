@@ -396,6 +396,9 @@ pub(crate) struct ExploreArguments {
     /// When timers end: when all tasks wait (idle), or at any point, as if what tasks do took so long (any)
     #[arg(long, value_enum, default_value = "idle")]
     pub(crate) timers: TimersChoice,
+    /// Take states for one that differ only by which of several like tasks is which
+    #[arg(long, conflicts_with = "random")]
+    pub(crate) symmetry: bool,
     /// Most switches of a schedule: points at which a task that could go on lets another one go first
     #[arg(long, value_name = "N")]
     pub(crate) switches: Option<usize>,

@@ -270,7 +270,8 @@ impl CommandExploration<'_> {
         say!(
             "{}",
             json!({
-                "verdict": verdict, "grain": grain, "timers": timers, "aborts": scope.aborts, "crashes": scope.crashes, "unseen": unseen, "states": states,
+                "verdict": verdict, "grain": grain, "timers": timers, "aborts": scope.aborts, "crashes": scope.crashes,
+                "symmetry": scope.symmetry, "unseen": unseen, "states": states,
                 "runs": runs, "findings": count, "limit": limit, "endless": self.options.is_endless,
                 "fairness": if fairness == Fairness::Weak { "weak" } else { "none" },
                 "seconds": self.started.elapsed().as_secs_f64(),

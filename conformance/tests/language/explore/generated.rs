@@ -391,6 +391,16 @@ impl GeneratedProgram {
         )
     }
 
+    /// Returns the text of a program of so many tasks, all of which do what the first one does.
+    pub(super) fn text_of_like_tasks(&self, count: usize) -> String {
+        format!(
+            "{SETUP}\n    {}\n  (dotimes (i {count}) (spawn {}))\n  (sleep 9)\n  (princ (list *seen-1* {}))",
+            self.setups.join("\n    "),
+            self.tasks[0].join(" "),
+            self.contents.join(" "),
+        )
+    }
+
     /// Takes the last action of the longest task away. Returns whether one was taken.
     pub(super) fn shorten(&mut self) -> bool {
         let Some(longest) = self.tasks.iter_mut().rev().max_by_key(|actions| actions.len()) else {

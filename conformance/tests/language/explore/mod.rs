@@ -17,6 +17,7 @@ mod random;
 mod resources;
 mod strict;
 mod suspension;
+mod symmetry;
 mod variables;
 
 use esl::Config;
