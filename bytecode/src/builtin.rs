@@ -1476,6 +1476,9 @@ macro_rules! for_each_builtin {
             CopyStructure = class::copy_structure, cl "COPY-STRUCTURE" ("structure") shares nothing;
             /// Whether `object` is an instance of some class.
             Structurep = class::structurep, internal "%STRUCTUREP" ("object") shares nothing;
+            /// The index of a slot of `instance`: the first one in `rows`, pairs of the names of a class and
+            /// a slot, whose class it is of. `NIL` if it is of none.
+            SlotPlace = class::slot_place, internal "%SLOT-PLACE" ("instance rows") shares nothing;
             /// Slot `index` of a structure of any class.
             StructureRef = class::structure_ref, internal "%STRUCTURE-REF" ("instance index") shares nothing;
             /// Makes `value` slot `index` of a structure of any class, and returns `value`.

@@ -14,6 +14,7 @@ use esl_heap::heap::layout::{Boxed, Cons};
 
 use crate::abi::NativeContext;
 use crate::arithmetic::{Arithmetic, NumberOrder};
+use crate::characters::values_of;
 use crate::emit::in_object;
 use crate::flow::{FlowStep, FrameChange};
 use crate::kinds::{Known, is_root};
@@ -312,6 +313,8 @@ impl Translator<'_, '_> {
                     self.lookup(window.0, count.0, operation);
                 } else if let Some(operation) = ElementOperation::of(builtin.0, count.0) {
                     self.matrix_element(window.0, operation);
+                } else if let Some(values) = values_of(builtin.0, count.0) {
+                    self.of_character(window.0, values);
                 } else {
                     self.call_builtin(window.0, Want::ONE);
                 }

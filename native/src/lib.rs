@@ -44,6 +44,7 @@ pub mod abi;
 mod arithmetic;
 mod branches;
 mod calls;
+mod characters;
 mod doubles;
 mod emit;
 mod flow;

@@ -33,7 +33,7 @@ pub use folder::{is_test_file, sources_in};
 pub use say::{print_error, print_text};
 pub use shell::{print_completions, write_man_pages};
 pub use status_line::{StatusLine, wants_color};
-pub use usage::{Habits, command_name, parse};
+pub use usage::{Habits, arguments, command_name, parse};
 pub use version::version_of_build;
 
 /// Exit status of success.

@@ -13,7 +13,7 @@ pub type Habits = &'static [(&'static str, &'static str)];
 
 /// Returns the arguments of the running command, its name first. A build of `eslvm` that contains `eslc` runs
 /// it where its own first argument says so: `eslvm eslc check FILE`.
-pub(crate) fn arguments() -> Vec<OsString> {
+pub fn arguments() -> Vec<OsString> {
     let mut arguments: Vec<OsString> = std::env::args_os().collect();
     if arguments.get(1).is_some_and(|first| first == "eslc") {
         arguments.remove(0);

@@ -1,5 +1,7 @@
 //! Structures and their classes.
 
+use smallvec::SmallVec;
+
 use crate::builtins::LIMIT;
 use crate::builtins::define::definable;
 use crate::builtins::list::list_items;
@@ -173,9 +175,29 @@ pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if vm.heap.is_instance(arguments[0]) {
         return instance_error(vm, arguments[0], vm.names.known.structure_object);
     }
-    let slots = slots.to_vec();
+    let slots: SmallVec<[Value; 8]> = slots.into();
     vm.exchange.charge(slots.len());
     Ok(vm.heap.alloc_structure(class, &slots)?)
+}
+
+pub(super) fn slot_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [instance, rows] = exactly(arguments);
+    let Some(own) = vm.heap.structure_class(instance) else { return Ok(Value::NIL) };
+    let is_of = |name: Value| {
+        vm.names.find_class(name).is_some_and(|class| vm.names.is_subclass(&vm.heap, own, class))
+    };
+    let mut steps = 0;
+    let mut pairs = class::list(&vm.heap, rows).filter_map(|row| vm.heap.as_cons(row));
+    let place = pairs.find(|row| {
+        steps += 1;
+        is_of(row.car)
+    });
+    let place = place.and_then(|row| {
+        let mut names = class::list(&vm.heap, class_slot(&vm.heap, own, slot::SLOTS));
+        names.position(|name| name == row.cdr)
+    });
+    vm.exchange.charge(steps + place.unwrap_or(0));
+    Ok(place.map_or(Value::NIL, Value::index))
 }
 
 pub(super) fn structure_ref(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -138,7 +138,7 @@ fn ancestors(heap: &Heap, class: Value) -> impl Iterator<Item = Value> {
 }
 
 /// Returns the items of one of the machine's own lists, which are proper.
-pub(super) fn list(heap: &Heap, list: Value) -> impl Iterator<Item = Value> {
+pub(crate) fn list(heap: &Heap, list: Value) -> impl Iterator<Item = Value> {
     let mut rest = list;
     std::iter::from_fn(move || {
         let pair = heap.as_cons(rest)?;

@@ -15,9 +15,9 @@ use esl_replay::{RecordedError, RunSetup};
 use esl_vm::vm::Tier;
 
 use super::figures::{print_snapshots, print_stats};
-use super::options::{ClockChoice, MachineOptions};
+use super::options::ClockChoice;
 use super::program::{complain_of_signal, program_with_sources};
-use super::run::RunReports;
+use super::run::RunOptions;
 use crate::operate::tell_manager;
 use crate::signal::{SignalTarget, end_on_signal_unless};
 
@@ -101,15 +101,12 @@ pub(super) fn refused(error: &DurableError) -> u8 {
 /// # Errors
 /// The exit status, after a message.
 pub(crate) fn run_durable(
-    file: &Path,
-    arguments: &[String],
+    folder: &Path,
+    command: &RunOptions,
     mut host: RealHost,
-    options: &MachineOptions,
-    state: (&Path, &StateOptions),
-    reports: &RunReports<'_>,
     path: &ModulePath,
 ) -> Result<u8, u8> {
-    let (folder, state) = state;
+    let RunOptions { machine: options, durable: state, file, arguments, .. } = command;
     let refuse = |error: DurableError| refused(&error);
     let is_virtual = match options.clock {
         ClockChoice::Real => false,
@@ -145,9 +142,9 @@ pub(crate) fn run_durable(
     run.control().on_resume(say_resumed);
     run.control().on_upgrade(say_upgraded);
     let (program, sources, _) =
-        program_with_sources(file, path, options, Instrumentation::None, reports.is_quiet, &signals)?;
+        program_with_sources(file, path, options, Instrumentation::None, command.compiling.quiet, &signals)?;
     let program = run.choose_program(&program, &sources, state.upgrade).map_err(refuse)?;
-    if run.arguments().is_some_and(|known| known != arguments) {
+    if run.arguments().is_some_and(|known| known != arguments.as_slice()) {
         return Err(refused(&DurableError::OtherSettings("other arguments of the program")));
     }
     if is_virtual {
@@ -173,13 +170,13 @@ pub(crate) fn run_durable(
     };
     program::set_module_folders(&mut machine, &folders).map_err(setup)?;
     program::set_program_file(&mut machine, &program_file).map_err(setup)?;
-    program::set_traces(&mut machine, reports.trace).map_err(setup)?;
+    program::set_traces(&mut machine, &command.trace).map_err(setup)?;
     run.prepare(&mut machine).map_err(refuse)?;
-    if reports.stats.is_some() {
+    if command.stats.is_some() {
         machine.gather_figures(false);
     }
-    machine.set_tier(reports.tier.map_or(Tier::Auto, Tier::from));
-    let traces = reports.trace.to_vec();
+    machine.set_tier(command.tier.map_or(Tier::Auto, Tier::from));
+    let traces = command.trace.clone();
     let setup_of_run = RunSetup { config: options.config(), traces, folders, program_file, schedule: None };
     run.begin(&program, &setup_of_run, &machine).map_err(refuse)?;
     if let Some(status) = run.ended() {
@@ -190,7 +187,7 @@ pub(crate) fn run_durable(
         return Ok(status);
     }
     let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
-    let served = reports.operate.begin(&mut machine, &name)?;
+    let served = command.operate.begin(&mut machine, &name)?;
     let managed = tell_manager(&machine, &name)?;
     let started = std::time::Instant::now();
     let main = match run.restore(&mut machine).map_err(refuse)? {
@@ -222,7 +219,7 @@ pub(crate) fn run_durable(
         program::Ended::Signalled(signal) => complain_of_signal(signal),
         _ => {}
     }
-    if reports.stats.is_some() {
+    if command.stats.is_some() {
         print_stats(&machine, &summary, started.elapsed().as_secs_f64());
         print_snapshots(run.snapshot_figures());
     }

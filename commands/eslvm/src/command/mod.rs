@@ -15,19 +15,17 @@ mod state;
 
 use std::path::Path;
 
-use clap::CommandFactory;
+use clap::{CommandFactory, Parser};
 use esl::Config;
-use esl::host::RealHost;
 use esl::module_path::ModulePath;
 use esl_command as command;
 
 use crate::repl::AttachSecurity;
-use crate::{explore::read_schedule, replay, testing};
+use crate::{replay, testing};
 
-use durable::run_durable;
 use explore::run_explore;
 use options::{ClockChoice, CompilingOptions, Eslvm, EslvmAction};
-use run::{RunReports, run};
+use run::{RunAlone, run_command};
 use state::run_state;
 
 /// Lets the process have as many open files and connections as the system allows it.
@@ -58,6 +56,18 @@ const HABITS: command::Habits = &[
     ("disasm", "eslc disasm"),
 ];
 
+/// Parses the command line. One that is wrong ends the process.
+fn parse() -> EslvmAction {
+    let mut arguments = command::arguments();
+    if arguments.get(1).is_some_and(|first| first == "run") {
+        arguments.remove(0);
+        if let Ok(alone) = RunAlone::try_parse_from(arguments) {
+            return EslvmAction::Run(Box::new(alone.options));
+        }
+    }
+    command::parse::<Eslvm>("eslvm run", HABITS).action
+}
+
 /// Runs the command line of the process, and returns its exit status.
 pub fn main() -> u8 {
     #[cfg(unix)]
@@ -68,73 +78,8 @@ pub fn main() -> u8 {
     }
     esl_vm::allocator::return_large_blocks();
     command::add_modules();
-    let status = match command::parse::<Eslvm>("eslvm run", HABITS).action {
-        EslvmAction::Run {
-            mut options,
-            compiling: CompilingOptions { modules, quiet: is_quiet },
-            speed,
-            stats,
-            tier,
-            realtime,
-            timeline,
-            profile,
-            profile_unit,
-            coverage,
-            schedule,
-            record,
-            mut trace,
-            full,
-            agent,
-            files,
-            operate,
-            durable,
-            file,
-            arguments,
-        } => {
-            if schedule.is_some() {
-                options.clock = ClockChoice::Virtual;
-            }
-            if full {
-                trace.push("full".into());
-            }
-            #[cfg(feature = "robots")]
-            if speed != 1.0 && options.clock == ClockChoice::Ros {
-                command::complain("`--speed` has no effect on the clock of ROS: leave it out");
-                return command::USAGE;
-            }
-            if realtime.is_some() && options.clock == ClockChoice::Virtual {
-                command::complain("`--realtime` has no effect on a virtual clock: leave it out");
-                return command::USAGE;
-            }
-            let path = ModulePath::new([file.as_path()], &modules.library);
-            let rights = agent.install().and_then(|()| options.rights.rights());
-            rights.and_then(|rights| {
-                let host =
-                    RealHost::new(arguments.clone()).with_rights(path.with_rights(rights)).with_speed(speed);
-                let schedule = schedule.as_deref().map(read_schedule).transpose()?;
-                let reports = RunReports {
-                    stats,
-                    tier,
-                    realtime,
-                    timeline: timeline.as_deref(),
-                    profile: profile.as_deref(),
-                    profile_unit,
-                    coverage: coverage.as_deref(),
-                    record: record.as_deref(),
-                    files: &files,
-                    trace: &trace,
-                    operate: &operate,
-                    is_quiet,
-                };
-                match &durable.state {
-                    Some(folder) => {
-                        let state = (folder.as_path(), &durable);
-                        run_durable(&file, &arguments, host, &options, state, &reports, &path)
-                    }
-                    None => run(&file, host, &options, &reports, schedule.as_ref(), &path),
-                }
-            })
-        }
+    let status = match parse() {
+        EslvmAction::Run(options) => run_command(*options),
         EslvmAction::Replay { options } => replay::run(&options),
         EslvmAction::State { options } => run_state(&options),
         #[cfg(unix)]

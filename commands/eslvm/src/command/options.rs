@@ -10,16 +10,13 @@ use esl::size::{parse_size, parse_stack};
 use esl_vm::value::Value;
 use esl_vm::vm::Tier;
 
-use super::durable::StateOptions;
 #[cfg(unix)]
 use super::host::{AgentsOptions, HostOptions};
 use super::injecting::InjectArguments;
-use super::parse::{parse_findings, parse_speed, parse_time};
+use super::parse::{parse_findings, parse_time};
+use super::run::RunOptions;
 use super::state::LookOptions;
-use crate::fleet::AgentOptions;
-use crate::mcap::{McapAction, RunFileOptions};
-use crate::operate::OperateOptions;
-use crate::profile::ProfileUnit;
+use crate::mcap::McapAction;
 use crate::replay::ReplayOptions;
 use crate::rights::RightsOptions;
 
@@ -65,70 +62,7 @@ pub(crate) enum EslvmAction {
     /// wrong usage, or a file that cannot be read or written; 3 the program does not compile or is refused;
     /// 4 no task can ever run again; 5 the budget or the memory is spent; 129, 130, 143 ended by SIGHUP,
     /// SIGINT or SIGTERM. However the run ends, the cleanups of its tasks are run.
-    Run {
-        #[command(flatten)]
-        options: MachineOptions,
-        #[command(flatten)]
-        compiling: CompilingOptions,
-        /// Seconds of the program's clock in a second of real time,
-        /// for a program connected to a simulator
-        #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_speed)]
-        speed: f64,
-        /// Print figures of the run to standard error at its end; with `=tasks` or `=functions`, also of
-        /// those with most ticks; with `=coverage`, also what was not run
-        #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
-        stats: Option<Stats>,
-        /// Execution of functions, which changes nothing in the run: by the interpreter, all as machine code,
-        /// or hot ones as machine code, the default. A build without the cargo feature `native` interprets
-        /// all, and reports that the option has no effect
-        #[arg(long, value_enum, value_name = "TIER", conflicts_with = "schedule")]
-        tier: Option<TierChoice>,
-        /// Let the run react in time, as far as the system permits it: lock its memory, and run it before
-        /// other programs, with a priority from 1 to 99, by default 50
-        #[arg(long, value_name = "PRIORITY", num_args = 0..=1, require_equals = true, default_missing_value = "50")]
-        #[arg(value_parser = clap::value_parser!(u8).range(1..=99), conflicts_with_all = ["schedule", "state"])]
-        realtime: Option<u8>,
-        /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
-        /// Perfetto
-        #[arg(long, value_name = "FILE")]
-        timeline: Option<PathBuf>,
-        /// Run the program by a schedule that `eslvm explore` has written; its clock is virtual then
-        #[arg(long, value_name = "FILE")]
-        schedule: Option<PathBuf>,
-        /// Record the run in a file, for `eslvm replay`: the program, and everything that reaches it
-        #[arg(long, value_name = "FILE")]
-        record: Option<PathBuf>,
-        /// Write a profile of ticks and time by task, call and line to a file: a flame graph if its name ends
-        /// in `.svg`, for speedscope if it ends in `.json`, else a line for each stack
-        #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
-        profile: Option<PathBuf>,
-        /// Unit of a flame graph and of lines of stacks; data for speedscope have both units
-        #[arg(long, value_enum, default_value_t = ProfileUnit::Ticks, value_name = "UNIT")]
-        #[arg(requires = "profile")]
-        profile_unit: ProfileUnit,
-        /// Write the coverage of lines, functions and arms to a file, in the format of lcov
-        #[arg(long, value_name = "FILE", conflicts_with_all = ["schedule", "record"])]
-        coverage: Option<PathBuf>,
-        /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
-        #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
-        trace: Vec<String>,
-        /// Show all calls of the library in reports of failures, which are folded otherwise
-        #[arg(long)]
-        full: bool,
-        #[command(flatten)]
-        agent: AgentOptions,
-        #[command(flatten)]
-        files: RunFileOptions,
-        #[command(flatten)]
-        operate: OperateOptions,
-        #[command(flatten)]
-        durable: StateOptions,
-        /// Source or bytecode file; `-` is a source from standard input
-        file: PathBuf,
-        /// Arguments of the program
-        #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARG")]
-        arguments: Vec<String>,
-    },
+    Run(Box<RunOptions>),
     /// Replay a recorded run, forwards and backwards
     ///
     /// Needs neither the sources nor the world of the program, and waits for nothing. With --until or

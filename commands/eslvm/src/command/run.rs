@@ -1,8 +1,9 @@
 //! `eslvm run`.
 
 use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::{Args, Parser};
 use esl::host::{Host, RealHost, RecordingHost};
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Instrumentation, Program, Schedule};
@@ -11,59 +12,136 @@ use esl_replay::{FileRecorder, RunSetup};
 use esl_timeline::Timeline;
 use esl_vm::vm::Tier;
 
+use super::durable::{StateOptions, run_durable};
 use super::figures::{print_functions, print_stats, print_tasks};
-use super::options::{ClockChoice, MachineOptions, Stats, TierChoice};
+use super::options::{ClockChoice, CompilingOptions, MachineOptions, Stats, TierChoice};
+use super::parse::parse_speed;
 use super::program::{complain_of_signal, program};
 use super::realtime::react_in_time;
+use crate::explore::read_schedule;
+use crate::fleet::AgentOptions;
 use crate::mcap::{McapRecording, RunFileOptions};
 use crate::operate::{OperateOptions, mission_of, tell_manager};
 use crate::profile::{INTERVAL, Profile, ProfileUnit};
 use crate::signal::{SignalTarget, end_on_signal};
 
-/// The requested reports of a run.
-pub(crate) struct RunReports<'a> {
+/// Arguments of `run`.
+#[derive(Args)]
+pub(crate) struct RunOptions {
+    #[command(flatten)]
+    pub(crate) machine: MachineOptions,
+    #[command(flatten)]
+    pub(crate) compiling: CompilingOptions,
+    /// Seconds of the program's clock in a second of real time,
+    /// for a program connected to a simulator
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_speed)]
+    pub(crate) speed: f64,
+    /// Print figures of the run to standard error at its end; with `=tasks` or `=functions`, also of
+    /// those with most ticks; with `=coverage`, also what was not run
+    #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
     pub(crate) stats: Option<Stats>,
+    /// Execution of functions, which changes nothing in the run: by the interpreter, all as machine code,
+    /// or hot ones as machine code, the default. A build without the cargo feature `native` interprets
+    /// all, and reports that the option has no effect
+    #[arg(long, value_enum, value_name = "TIER", conflicts_with = "schedule")]
     pub(crate) tier: Option<TierChoice>,
+    /// Let the run react in time, as far as the system permits it: lock its memory, and run it before
+    /// other programs, with a priority from 1 to 99, by default 50
+    #[arg(long, value_name = "PRIORITY", num_args = 0..=1, require_equals = true, default_missing_value = "50")]
+    #[arg(value_parser = clap::value_parser!(u8).range(1..=99), conflicts_with_all = ["schedule", "state"])]
     pub(crate) realtime: Option<u8>,
-    pub(crate) timeline: Option<&'a Path>,
-    pub(crate) record: Option<&'a Path>,
-    pub(crate) files: &'a RunFileOptions,
-    pub(crate) profile: Option<&'a Path>,
+    /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
+    /// Perfetto
+    #[arg(long, value_name = "FILE")]
+    pub(crate) timeline: Option<PathBuf>,
+    /// Run the program by a schedule that `eslvm explore` has written; its clock is virtual then
+    #[arg(long, value_name = "FILE")]
+    pub(crate) schedule: Option<PathBuf>,
+    /// Record the run in a file, for `eslvm replay`: the program, and everything that reaches it
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+    /// Write a profile of ticks and time by task, call and line to a file: a flame graph if its name ends
+    /// in `.svg`, for speedscope if it ends in `.json`, else a line for each stack
+    #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
+    pub(crate) profile: Option<PathBuf>,
+    /// Unit of a flame graph and of lines of stacks; data for speedscope have both units
+    #[arg(long, value_enum, default_value_t = ProfileUnit::Ticks, value_name = "UNIT")]
+    #[arg(requires = "profile")]
     pub(crate) profile_unit: ProfileUnit,
-    pub(crate) coverage: Option<&'a Path>,
-    pub(crate) trace: &'a [String],
-    pub(crate) operate: &'a OperateOptions,
-    pub(crate) is_quiet: bool,
+    /// Write the coverage of lines, functions and arms to a file, in the format of lcov
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["schedule", "record"])]
+    pub(crate) coverage: Option<PathBuf>,
+    /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
+    #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
+    pub(crate) trace: Vec<String>,
+    /// Show all calls of the library in reports of failures, which are folded otherwise
+    #[arg(long)]
+    pub(crate) full: bool,
+    #[command(flatten)]
+    pub(crate) agent: AgentOptions,
+    #[command(flatten)]
+    pub(crate) files: RunFileOptions,
+    #[command(flatten)]
+    pub(crate) operate: OperateOptions,
+    #[command(flatten)]
+    pub(crate) durable: StateOptions,
+    /// Source or bytecode file; `-` is a source from standard input
+    pub(crate) file: PathBuf,
+    /// Arguments of the program
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARG")]
+    pub(crate) arguments: Vec<String>,
+}
+
+/// The command line of `run` alone, which is made in a fraction of the time that all of them take.
+#[derive(Parser)]
+pub(crate) struct RunAlone {
+    #[command(flatten)]
+    pub(crate) options: RunOptions,
+}
+
+/// Runs a program as these options say. Returns the exit status.
+///
+/// # Errors
+/// The exit status, after a message.
+pub(crate) fn run_command(mut run: RunOptions) -> Result<u8, u8> {
+    if run.schedule.is_some() {
+        run.machine.clock = ClockChoice::Virtual;
+    }
+    if run.full {
+        run.trace.push("full".into());
+    }
+    #[cfg(feature = "robots")]
+    if run.speed != 1.0 && run.machine.clock == ClockChoice::Ros {
+        complain("`--speed` has no effect on the clock of ROS: leave it out");
+        return Err(USAGE);
+    }
+    if run.realtime.is_some() && run.machine.clock == ClockChoice::Virtual {
+        complain("`--realtime` has no effect on a virtual clock: leave it out");
+        return Err(USAGE);
+    }
+    run.agent.install()?;
+    let path = ModulePath::new([run.file.as_path()], &run.compiling.modules.library);
+    let rights = path.with_rights(run.machine.rights.rights()?);
+    let host = RealHost::new(run.arguments.clone()).with_rights(rights).with_speed(run.speed);
+    match &run.durable.state {
+        Some(folder) => run_durable(folder, &run, host, &path),
+        None => run_once(&run, host, &path),
+    }
 }
 
 /// Runs the program in a file, or the source in it. Returns the exit status.
 ///
 /// # Errors
 /// The exit status, after a message.
-pub(crate) fn run(
-    file: &Path,
-    mut host: RealHost,
-    options: &MachineOptions,
-    reports: &RunReports<'_>,
-    schedule: Option<&Schedule>,
-    path: &ModulePath,
-) -> Result<u8, u8> {
-    let RunReports {
-        stats,
-        tier,
-        realtime,
-        timeline,
-        profile,
-        profile_unit,
-        coverage,
-        record,
-        files,
-        trace,
-        operate,
-        is_quiet,
-    } = *reports;
+fn run_once(run: &RunOptions, mut host: RealHost, path: &ModulePath) -> Result<u8, u8> {
+    let RunOptions { machine: options, file, stats, tier, operate, files, trace, .. } = run;
+    let (stats, is_quiet) = (*stats, run.compiling.quiet);
+    let [timeline, profile, coverage, record] =
+        [&run.timeline, &run.profile, &run.coverage, &run.record].map(|path| path.as_deref());
+    let schedule = run.schedule.as_deref().map(read_schedule).transpose()?;
+    let schedule = schedule.as_ref();
     for output in [timeline, profile, coverage, record, files.mcap.as_deref()].into_iter().flatten() {
-        refuse_overwriting(output, [file])?;
+        refuse_overwriting(output, [file.as_path()])?;
     }
     let signals = SignalTarget::default();
     end_on_signal(signals.clone());
@@ -140,7 +218,7 @@ pub(crate) fn run(
         recorder.begin(&beginning);
     }
     let managed = tell_manager(&machine, &name)?;
-    if let Some(priority) = realtime {
+    if let Some(priority) = run.realtime {
         react_in_time(priority, options.config().memory);
     }
     let started = std::time::Instant::now();
@@ -183,7 +261,7 @@ pub(crate) fn run(
         status = refused;
     }
     if let (Some(path), Some(found)) = (profile, &found)
-        && let Err(error) = found.write(path, profile_unit)
+        && let Err(error) = found.write(path, run.profile_unit)
     {
         status = not_written(path, &error);
     }

@@ -1,0 +1,30 @@
+;;; mandelbrot, with declarations for SBCL.
+
+(declaim (optimize (speed 3) (safety 1)))
+
+(declaim (inline escape-time))
+(defun escape-time (cr ci limit)
+  (declare (type double-float cr ci) (type fixnum limit))
+  (do ((zr 0.0 (+ (- (* zr zr) (* zi zi)) cr))
+       (zi 0.0 (+ (* 2.0 zr zi) ci))
+       (n 0 (+ n 1)))
+      ((or (= n limit)
+           (> (+ (* zr zr) (* zi zi)) 4.0))
+       n)
+    (declare (type double-float zr zi) (type fixnum n))))
+
+(defun mandelbrot (size limit)
+  (declare (type fixnum size limit))
+  (let ((inside 0)
+        (steps 0))
+    (declare (type fixnum inside steps))
+    (dotimes (y size)
+      (let ((ci (- (/ (* 2.0 y) size) 1.0)))
+        (dotimes (x size)
+          (let ((n (escape-time (- (/ (* 2.0 x) size) 1.5) ci limit)))
+            (incf steps n)
+            (when (= n limit)
+              (incf inside))))))
+    (format t "~d ~d~%" inside steps)))
+
+(mandelbrot 800 50)
