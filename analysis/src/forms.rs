@@ -127,7 +127,8 @@ impl CoreForm {
         })
     }
 
-    /// Returns the value of an option of the `spawn` whose call of `%spawn` a node is: not of one in its body.
+    /// Returns the value of an option of the `spawn` whose call of `%spawn` a node is, not of one in its
+    /// body.
     pub(crate) fn spawn_option(&self, node: NodeId, name: &str) -> Option<NodeId> {
         let is_spawn = matches!(self.kind(node), NodeKind::Call(callee, arguments)
             if arguments.len() > 1 && symbol_of(callee).is_some_and(|symbol| symbol.name() == "%SPAWN"));

@@ -18,8 +18,11 @@ const CODES: usize = 0x80;
 /// The words of the values that a builtin has for them.
 pub(crate) type AsciiValues = [u64; CODES];
 
-/// The builtins, called with one argument, and what each returns for a code.
-const ROWS: [(Builtin, fn(u32) -> Value); 10] = [
+/// Returns the value of a builtin for a code.
+type AsciiFunction = fn(u32) -> Value;
+
+/// The builtins, called with one argument, and what each returns.
+const ROWS: [(Builtin, AsciiFunction); 10] = [
     (Builtin::AlphaCharp, |code| character::is_alphabetic(code).into()),
     (Builtin::Alphanumericp, |code| character::is_alphanumeric(code).into()),
     (Builtin::BothCasep, |code| (character::is_upper(code) || character::is_lower(code)).into()),

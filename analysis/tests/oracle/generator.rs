@@ -1,9 +1,8 @@
 //! Random programs that fail: small ones, of the forms of the language that have to do with failures.
 //!
-//! Handling forms and their clauses begin lines of their own, with a mark, so that the rows of a table can be
-//! found by it. `(seen ID form)` stands around the bodies of functions and of handling forms, `(took ID form…)`
-//! and `(caught ID form…)` around those of clauses; they are macros that do nothing, or note the failures that
-//! come by.
+//! Handling forms and their clauses begin lines of their own, with a mark by which rows of a table are found.
+//! `(seen ID form)` stands around the bodies of functions and of handling forms, `(took ID form…)` and
+//! `(caught ID form…)` around those of clauses: macros that do nothing, or note the failures that come by.
 //!
 //! Guarantees: a number yields the same program on every machine.
 
@@ -480,10 +479,8 @@ impl Generator {
                 0 => _ = writeln!(text, "(handler-case (f{function}) (serious-condition () 1))"),
                 _ => {
                     let name = format!("top-{function}");
-                    _ = writeln!(
-                        text,
-                        "(wait-for-task (spawn (:name \"{name}\") (seen {name} (f{function}))))"
-                    );
+                    let body = format!("(seen {name} (f{function}))");
+                    _ = writeln!(text, "(wait-for-task (spawn (:name \"{name}\") {body}))");
                 }
             }
         }

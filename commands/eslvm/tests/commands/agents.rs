@@ -242,7 +242,7 @@ fn agents_of_another_version_begin_anew_from_their_facts() {
     assert_eq!(host.end("-KILL").0, None);
     let trial = agents
         .folder
-        .file("other.esl", &text.replace("(incf *sum* (", "(incf *sum* (* 2 (").replace("add))", "add)))"));
+        .file("other.esl", text.replace("(incf *sum* (", "(incf *sum* (* 2 (").replace("add))", "add)))"));
     let one = agents.folder.join("agents/one.state");
     let tried = eslvm(&["state", "--upgrade", &trial, &one]).output().expect("the command is there");
     // An agent that waits for messages is in no deadlock.
