@@ -743,15 +743,13 @@ esl_status esl_durable_set_downtime(const esl_durable *durable, bool counts, esl
 esl_status esl_durable_set_snapshots(const esl_durable *durable, const char *when, esl_failure **failure);
 
 /**
- * Has a run of another version of the machine begin anew, with its facts and the variables of `defdurable`, as
- * `--from-facts` does. A run of this version goes on.
+ * Has a run of another version of the machine begin anew, with its facts and the variables of `defdurable`,
+ * as `--from-facts` does. A run of this version goes on.
  *
  * The caller sees to it that
  * As for `esl_durable_set_power`.
  */
-esl_status esl_durable_set_from_facts(const esl_durable *durable,
-                                      bool from_facts,
-                                      esl_failure **failure);
+esl_status esl_durable_set_from_facts(const esl_durable *durable, bool from_facts, esl_failure **failure);
 
 /**
  * Has a run whose program has changed make the new definitions before it goes on, as `--upgrade` does.
