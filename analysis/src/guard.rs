@@ -93,13 +93,18 @@ pub(crate) fn recover(
     let triggers = |from: usize, to: usize| {
         effects[from].failures.iter().any(|failure| applies(*failure, to) != Applies::No)
     };
+    // A clause has the body begin again by itself, or by another clause that takes its failure.
+    let mut begins_again: Vec<bool> = clauses.iter().map(|clause| clause.ways.retries).collect();
+    loop {
+        let found = (0..count).find(|from| {
+            !begins_again[*from] && (0..count).any(|to| begins_again[to] && triggers(*from, to))
+        });
+        let Some(found) = found else { break };
+        begins_again[found] = true;
+    }
     let passes_on = |clause: usize, from: Option<usize>| {
-        let may_be_spent = match from {
-            None => clauses[clause].ways.retries || resumes[clause],
-            Some(from) => {
-                from == clause || triggers(clause, from) || clauses[clause].ways.retries || resumes[clause]
-            }
-        };
+        let comes_back = begins_again[clause] || resumes[clause];
+        let may_be_spent = comes_back || from.is_some_and(|from| from == clause || triggers(clause, from));
         match clauses[clause].limit {
             ClauseLimit::None => false,
             // It may be 0.

@@ -51,6 +51,17 @@ fn a_clause_whose_number_is_computed_may_never_run() {
 }
 
 #[test]
+fn a_clause_is_spent_if_another_begins_again_for_its_failure() {
+    let clause = |limit: &str| {
+        format!(
+            "(defun f () (with-recovery-procedures ((:a {limit} (fail :b)) (:b :retries 2 (retry))) (fail :a)))"
+        )
+    };
+    check(&clause(""), ":a :b");
+    check(&clause(":retries :infinite"), ":b");
+}
+
+#[test]
 fn a_cleanup_fails_while_control_leaves_for_a_clause_that_is_spent() {
     let with = |clauses: &str| {
         format!("(defun f () (with-recovery-procedures ({clauses}) (unwind-protect (fail :a) (fail :b))))")
