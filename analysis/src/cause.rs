@@ -82,11 +82,11 @@ pub(crate) fn is_standard(symbol: &Symbol) -> bool {
 
 /// Whether a clause for a cause may take programming errors: a value of a wrong type, a division by zero.
 pub(crate) fn may_be_mistake(forms: &CoreForms, cause: &Symbol) -> bool {
-    let is_changed = || forms.parents.keys().any(|known| known.is_keyword() && is_mistake(known.name()));
-    !cause.is_keyword() || is_mistake(cause.name()) || is_changed()
+    !cause.is_keyword() || is_mistake(cause.name()) || forms.redefines_mistakes
 }
 
-fn is_mistake(name: &str) -> bool {
+/// Whether a cause or a type with this name is one of the standard.
+pub(crate) fn is_mistake(name: &str) -> bool {
     name == "T" || parents_of_standard(name).is_some()
 }
 
@@ -177,6 +177,37 @@ pub(crate) fn clause_applies(
             condition_has_name(forms, symbol(name), wanted).into()
         }
         FailureKind::Any(_) | FailureKind::Unknown(_) => Applies::Perhaps,
+    }
+}
+
+/// Returns the causes of the clauses that may take failures of a kind, beside `:general-failure`; `None` if
+/// any may.
+pub(crate) fn clause_causes(
+    forms: &CoreForms,
+    names: &Numbering<Symbol>,
+    kind: FailureKind,
+) -> Option<Vec<Symbol>> {
+    let of_condition = |condition: &Symbol| -> Vec<Symbol> {
+        names_above_condition(forms, condition).iter().map(|name| Symbol::keyword(name)).collect()
+    };
+    match kind {
+        FailureKind::Cause(name) => {
+            let cause = &names.keys[name.index()];
+            let mut found = vec![cause.clone()];
+            let mut next = 0;
+            while let Some(symbol) = found.get(next) {
+                let parents = forms.parents.get(symbol).into_iter().flatten();
+                let more: Vec<Symbol> = parents.filter(|parent| !found.contains(parent)).cloned().collect();
+                found.extend(more);
+                next += 1;
+            }
+            found.extend(condition_of(forms, cause).iter().flat_map(of_condition));
+            Some(found)
+        }
+        FailureKind::Condition(name) | FailureKind::CauseOf(name) => {
+            Some(of_condition(&names.keys[name.index()]))
+        }
+        FailureKind::Below(_) | FailureKind::Any(_) | FailureKind::Unknown(_) => None,
     }
 }
 

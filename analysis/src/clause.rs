@@ -108,6 +108,22 @@ fn bodies_of(core: &Core, procedures: LambdaId, count: usize) -> Vec<NodeId> {
                 node = *body;
             }
             NodeKind::Progn(nodes) if nodes.len() == 1 => node = nodes[0],
+            // Many clauses stand in a row, and leave a block.
+            NodeKind::Block(_, inside) => node = *inside,
+            NodeKind::Progn(nodes) => {
+                for one in nodes {
+                    if let NodeKind::If(test, then, _) = &core.nodes[one.index()].kind
+                        && let Some(number) = tested_number(core, *test, &keys)
+                        && let Some(body) = bodies.get_mut((number.saturating_sub(1) / 2) as usize)
+                    {
+                        *body = match &core.nodes[then.index()].kind {
+                            NodeKind::ReturnFrom(_, value) => *value,
+                            _ => *then,
+                        };
+                    }
+                }
+                break;
+            }
             NodeKind::If(test, then, otherwise) => {
                 let Some(number) = tested_number(core, *test, &keys) else { break };
                 if let Some(body) = bodies.get_mut((number.saturating_sub(1) / 2) as usize) {

@@ -7,6 +7,7 @@ use esl_compiler::core::{Callee, Core, LambdaId, NodeId, NodeKind, VarId};
 use esl_compiler::{children, lambda_nodes};
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::cause::is_mistake;
 use crate::clause::{Clause, can_end, clauses_of};
 
 /// A form that handles failures, or a part of a program that is looked at by itself, such as a clause.
@@ -58,8 +59,8 @@ pub(crate) struct CoreForm {
     pub(crate) block_nodes: Vec<NodeId>,
     /// Whether each node is in the cleanup of an `unwind-protect` of the same lambda.
     pub(crate) in_cleanup: Vec<bool>,
-    /// Bodies of the clauses of a lambda that runs clauses.
-    clause_bodies: FxHashMap<LambdaId, Vec<NodeId>>,
+    /// Bodies of the clauses of a lambda that runs clauses, with their positions.
+    clause_bodies: FxHashMap<LambdaId, FxHashMap<NodeId, usize>>,
 }
 
 impl CoreForm {
@@ -91,9 +92,8 @@ impl CoreForm {
             lambda_nodes(&self.core.lambdas[lambda.index()], &mut |node| row.push((node, None)));
             while let Some((node, scope)) = row.pop() {
                 let bodies = self.clause_bodies.get(&lambda);
-                let position = bodies.and_then(|bodies| bodies.iter().position(|body| *body == node));
-                let scope = match position {
-                    Some(position) => Some(self.add_scope(ScopeKind::ClauseBody(position), scope)),
+                let scope = match bodies.and_then(|bodies| bodies.get(&node)) {
+                    Some(position) => Some(self.add_scope(ScopeKind::ClauseBody(*position), scope)),
                     None => scope,
                 };
                 self.owners[node.index()] = lambda;
@@ -169,7 +169,10 @@ impl CoreForm {
             NodeKind::Recovery { table, procedures, body } => {
                 if let NodeKind::Lambda(lambda) = self.core.nodes[procedures.index()].kind {
                     let (clauses, bodies) = clauses_of(&self.core, *table, lambda);
-                    self.clause_bodies.insert(lambda, bodies);
+                    let places = self.clause_bodies.entry(lambda).or_default();
+                    for (position, body) in bodies.into_iter().enumerate() {
+                        places.entry(body).or_insert(position);
+                    }
                     let kind = ScopeKind::Recovery { node, clauses, procedures: lambda };
                     inner = Some((*body, self.add_scope(kind, scope)));
                 }
@@ -271,6 +274,8 @@ pub(crate) struct CoreForms {
     pub(crate) scripted: FxHashSet<Symbol>,
     /// Included structure of each structure.
     pub(crate) included: FxHashMap<Symbol, Symbol>,
+    /// Whether the program defines causes with the names of the standard's.
+    pub(crate) redefines_mistakes: bool,
     /// Whether the program declares causes.
     pub(crate) declares_causes: bool,
     /// Whether the program narrows its rights.
@@ -299,6 +304,8 @@ impl CoreForms {
         for index in 0..forms.forms.len() {
             forms.note_definitions(index);
         }
+        let mut causes = forms.parents.keys().filter(|known| known.is_keyword());
+        forms.redefines_mistakes = causes.any(|known| is_mistake(known.name()));
         forms
     }
 

@@ -9,7 +9,7 @@ use esl_compiler::children;
 use esl_compiler::core::{Callee, LambdaId, NodeId, NodeKind};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::cause::{Applies, clause_applies};
+use crate::cause::clause_causes;
 use crate::clause::can_end;
 use crate::effect::FailureKind;
 use crate::forms::{CoreForm, CoreForms, ScopeKind};
@@ -86,16 +86,18 @@ fn functions_of_clauses(forms: &CoreForms) -> CalledFunctions {
 /// Returns the clauses whose ends control can reach, by form, node of the recovery form, and position.
 pub(crate) fn resuming_clauses(forms: &CoreForms) -> FxHashSet<(u32, NodeId, usize)> {
     let mut found: FxHashSet<(u32, NodeId, usize)> = FxHashSet::default();
-    let mut causes: Vec<Symbol> = Vec::new();
+    let mut causes: FxHashSet<Symbol> = FxHashSet::default();
+    let general = Symbol::keyword("GENERAL-FAILURE");
     let mut functions = functions_of_clauses(forms);
     loop {
         let comes_back = |cause: &str| {
-            let is_it = |known: &Symbol| {
-                let mut names = Numbering::default();
-                let kind = FailureKind::Cause(crate::value::NameId(names.number(&Symbol::keyword(cause)).0));
-                clause_applies(forms, &names, kind, known) != Applies::No
-            };
-            if cause.is_empty() { !causes.is_empty() } else { causes.iter().any(is_it) }
+            if cause.is_empty() || causes.contains(&general) {
+                return !causes.is_empty();
+            }
+            let mut names = Numbering::default();
+            let kind = FailureKind::Cause(crate::value::NameId(names.number(&Symbol::keyword(cause)).0));
+            let wanted = clause_causes(forms, &names, kind);
+            wanted.is_none_or(|wanted| wanted.iter().any(|known| causes.contains(known)))
         };
         let leaves = |form: &CoreForm, node: NodeId| {
             if let NodeKind::Call(Callee::Global(name), _) | NodeKind::Apply(Callee::Global(name), _) =
