@@ -30,7 +30,7 @@ const TELLING: &str = "(defun tell (what id c) (write-string (format nil \"~a ~a
     (handler-bind ((serious-condition (lambda (c) (tell 'by ',id (failure-cause c))))) ,form))) \
     (defmacro took (id &body forms) `(progn (tell 'took ',id nil) \
     (handler-bind ((serious-condition (lambda (c) (tell 'out ',id (failure-cause c))))) ,@forms))) \
-    (defmacro caught (id &body forms) `(progn (tell 'took ',id nil) ,@forms))\n";
+    (defmacro caught (id &body forms) `(progn (tell 'caught ',id (failure-cause c)) ,@forms))\n";
 
 /// Kinds of rows whose inferred failures are counted.
 #[derive(Debug, Default, Clone, Copy)]
@@ -161,7 +161,8 @@ fn run(text: &str, seed: u64, seen: &mut SeenFailures) -> Option<()> {
     let captured = host.captured();
     let mut machine = machine(config, Box::new(host)).ok()?;
     run_in(&mut machine, &program).ok()?;
-    // The failure that was seen last in each task is the one that a clause takes.
+    // The failure that was seen last in each task is the one that a clause of recovery takes. Before one of
+    // `handler-case` runs, cleanups can fail.
     let mut last: BTreeMap<String, String> = BTreeMap::new();
     for line in captured.output().lines() {
         let Some((what, rest)) = line.split_once(' ') else { continue };
@@ -178,6 +179,11 @@ fn run(text: &str, seed: u64, seen: &mut SeenFailures) -> Option<()> {
                 if let Some(cause) = last.get(task) {
                     seen.causes.entry(("clause".into(), id)).or_default().insert(cause.clone());
                 }
+                continue;
+            }
+            "CAUGHT" => {
+                seen.entered.insert(id.clone());
+                seen.causes.entry(("clause".into(), id)).or_default().insert(cause);
                 continue;
             }
             "BY" if id.starts_with('f') => "function",

@@ -68,6 +68,10 @@ const TYPES: [&str; 12] = [
     "(and error (not k0))",
 ];
 
+/// Forms without failures.
+const HARMLESS: [&str; 8] =
+    ["1", "nil", "'a", "(random 3)", "(sleep 0.5)", "(sleep 1)", "*level*", "(incf *level*)"];
+
 /// Programming errors.
 const MISTAKES: [&str; 14] = [
     "(car (random 3))",
@@ -147,17 +151,7 @@ impl Generator {
 
     /// Returns a form without failures.
     fn harmless(&mut self) -> String {
-        self.choose(&[
-            "1",
-            "nil",
-            "'a",
-            "(random 3)",
-            "(sleep 0.5)",
-            "(sleep 1)",
-            "*level*",
-            "(incf *level*)",
-        ])
-        .into()
+        self.choose(&HARMLESS).into()
     }
 
     /// Returns the name of a function that may be called.
