@@ -130,7 +130,7 @@ impl ValueFlow<'_> {
     fn call_closure(&mut self, point: &CallPoint, code: Code) {
         let forms = self.forms;
         let lambda = &forms.forms[code.form as usize].core.lambdas[code.lambda.index()];
-        let is_through = point.passing == Passing::Through;
+        let is_through = matches!(point.passing, Passing::Through | Passing::Interrupting);
         if !takes(lambda, &point.arguments) {
             if is_through {
                 self.note(point.spot, NodeEffect::Mistake(mistake::PROGRAM));
@@ -144,6 +144,10 @@ impl ValueFlow<'_> {
         self.run(code);
         let effect = match point.passing {
             Passing::Through => NodeEffect::Call(code),
+            Passing::Interrupting => {
+                self.note(point.spot, NodeEffect::InterruptsBy(code));
+                NodeEffect::Call(code)
+            }
             Passing::Absorbed => NodeEffect::Absorb(code),
             Passing::Task(work) => {
                 let body = self.cell(CellKey::Body(work));
@@ -293,6 +297,13 @@ impl ValueFlow<'_> {
     pub(crate) fn fail(&mut self, spot: Spot, cause: &str) {
         let name = self.name(&Symbol::keyword(cause));
         self.note(spot, NodeEffect::Fail(FailureKind::Cause(name)));
+    }
+
+    /// Has a spot fail for sure with this cause, which ends the code that it calls.
+    pub(crate) fn interrupt(&mut self, spot: Spot, cause: &str) {
+        self.fail(spot, cause);
+        let name = self.name(&Symbol::keyword(cause));
+        self.note(spot, NodeEffect::Interrupts(name));
     }
 
     /// Has a spot fail with a condition of a type of the library.

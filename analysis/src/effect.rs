@@ -79,6 +79,15 @@ pub(crate) enum NodeEffect {
     FailByCauseOf(WorkId),
     /// The limit of a task ends it with this cause.
     Limit(WorkId, NameId),
+    /// The failure with this cause, which begins here, interrupts the code that the node calls.
+    Interrupts(NameId),
+    /// The failures of this code, which the node calls, begin within the other code that it calls.
+    InterruptsBy(Code),
+    /// Control may leave for a place around the failure that a clause or a handler runs for: a `throw`, a
+    /// restart, the next bindings of a query.
+    Jump,
+    /// It may wait.
+    Wait,
     /// It may be a programming error of these kinds.
     Mistake(u8),
 }

@@ -165,6 +165,7 @@ impl ValueFlow<'_> {
                 let is_of_clause = matches!(form.kind(*tag), NodeKind::Local(tag) if form.is_state(*tag));
                 if !is_of_clause {
                     self.note(spot, NodeEffect::Mistake(mistake::PROGRAM));
+                    self.note(spot, NodeEffect::Jump);
                 }
                 let thrown = self.cell(CellKey::Thrown);
                 self.join(here, *from, thrown);

@@ -67,6 +67,8 @@ pub(crate) enum FlowWatcher {
 pub(crate) enum Passing {
     /// They leave the call.
     Through,
+    /// They leave the call, and begin within other code that it calls.
+    Interrupting,
     /// They end there; the form fails otherwise, or goes on.
     Absorbed,
     /// They end a task.

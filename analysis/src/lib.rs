@@ -32,6 +32,7 @@ mod resuming;
 mod rights;
 mod row;
 mod solve;
+mod spent;
 mod table;
 mod taken;
 mod types;

@@ -1,11 +1,13 @@
 //! The fixed point of effects: the failures that may leave each piece of code, each task and each clause.
 
+use std::collections::BTreeSet;
+
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::NodeId;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::effect::{FailureKind, NodeEffect, mistake};
-use crate::flow::ValueFlow;
+use crate::flow::{RunningCode, ValueFlow};
 use crate::forms::{CoreForm, ScopeKind};
 use crate::guard::{FailureFacts, FailureId, Handled, LeavingFailures, recover, take};
 use crate::resuming::resuming_clauses;
@@ -34,8 +36,12 @@ pub(crate) struct Solution {
     pub(crate) of_clauses: FxHashMap<(usize, usize), LeavingFailures>,
     /// Failures that end each task.
     pub(crate) of_works: Vec<LeavingFailures>,
-    /// Whether a handling form has caught further failures in this round.
-    has_caught: bool,
+    /// Whether further failures have been caught, or found in interrupted code, in this round.
+    has_found: bool,
+    /// Failures that interrupt code, with the failures of that code and of the clauses that run in it.
+    interrupted: FxHashMap<FailureId, LeavingFailures>,
+    /// Causes of the clauses in `resuming`.
+    resuming_causes: Vec<Symbol>,
     /// Failures that handling forms catch.
     caught: FxHashMap<Spot, LeavingFailures>,
     /// Results of handling forms, by the piece of code and the scope.
@@ -52,6 +58,7 @@ pub(crate) fn solve(flow: &ValueFlow<'_>) -> Solution {
         resuming: resuming_clauses(flow.forms),
         ..Solution::default()
     };
+    solution.resuming_causes = causes_of(flow, &solution.resuming);
     let bodies = bodies_of_works(flow);
     for _ in 0..MOST_ROUNDS {
         let mut has_changed = false;
@@ -61,12 +68,26 @@ pub(crate) fn solve(flow: &ValueFlow<'_>) -> Solution {
         for (index, codes) in bodies.iter().enumerate() {
             has_changed |= solution.end_work(flow, WorkId(index as u32), codes);
         }
-        has_changed |= std::mem::take(&mut solution.has_caught);
+        has_changed |= std::mem::take(&mut solution.has_found);
         if !has_changed {
             break;
         }
     }
     solution
+}
+
+/// Returns the causes of clauses.
+fn causes_of(flow: &ValueFlow<'_>, wanted: &FxHashSet<(u32, NodeId, usize)>) -> Vec<Symbol> {
+    let mut causes: FxHashSet<&Symbol> = FxHashSet::default();
+    for (number, form) in flow.forms.forms.iter().enumerate() {
+        for scope in &form.scopes {
+            let ScopeKind::Recovery { node, clauses, .. } = &scope.kind else { continue };
+            let named = clauses.iter().enumerate();
+            let named = named.filter(|(position, _)| wanted.contains(&(number as u32, *node, *position)));
+            causes.extend(named.map(|(_, clause)| &clause.cause));
+        }
+    }
+    causes.into_iter().cloned().collect()
 }
 
 /// Returns the code that each task or operation runs.
@@ -131,6 +152,7 @@ impl Solution {
         let running = &flow.running[number];
         let code = running.code;
         let form = &flow.forms.forms[code.form as usize];
+        self.note_interruptions(flow, number);
         let mut result = LeavingFailures::default();
         let mut scopes: FxHashMap<usize, LeavingFailures> = FxHashMap::default();
         for (node, effect) in &running.effects {
@@ -170,6 +192,46 @@ impl Solution {
         has_changed | self.leaving[number].add(&result)
     }
 
+    /// Notes which failures interrupt the code that a piece of code calls, and how that can fail.
+    fn note_interruptions(&mut self, flow: &ValueFlow<'_>, number: usize) {
+        let RunningCode { code, effects } = &flow.running[number];
+        let mut calls: FxHashMap<NodeId, Vec<Code>> = FxHashMap::default();
+        for (node, effect) in effects {
+            if matches!(effect, NodeEffect::Interrupts(_) | NodeEffect::InterruptsBy(_)) {
+                calls.entry(*node).or_default();
+            }
+        }
+        if calls.is_empty() {
+            return;
+        }
+        for (node, effect) in effects {
+            if let (NodeEffect::Call(called), Some(row)) = (effect, calls.get_mut(node)) {
+                row.push(*called);
+            }
+        }
+        for (node, effect) in effects {
+            let (failures, alarm) = match effect {
+                NodeEffect::Interrupts(cause) => {
+                    let failure = self.failure(FailureKind::Cause(*cause), code.form, *node);
+                    (BTreeSet::from([failure]), None)
+                }
+                NodeEffect::InterruptsBy(alarm) => {
+                    let leaving = flow.number_of(*alarm).map(|number| self.leaving[number].failures.clone());
+                    (leaving.unwrap_or_default(), Some(alarm))
+                }
+                _ => continue,
+            };
+            let mut inside = LeavingFailures::default();
+            let others = calls.get(node).into_iter().flatten().filter(|called| Some(*called) != alarm);
+            for called in others.filter_map(|called| flow.number_of(*called)) {
+                inside.failures.extend(&self.leaving[called].failures);
+            }
+            for failure in failures {
+                self.has_found |= self.interrupted.entry(failure).or_default().add(&inside);
+            }
+        }
+    }
+
     /// Whether a scope is one of the lambda of a piece of code.
     fn is_in(&self, form: &CoreForm, scope: usize, code: Code) -> bool {
         form.scopes[scope].kind.node().is_some_and(|node| form.owners[node.index()] == code.lambda)
@@ -185,7 +247,13 @@ impl Solution {
         kind: &ScopeKind,
         inside: &LeavingFailures,
     ) -> LeavingFailures {
-        let known = FailureFacts { forms: flow.forms, names: &flow.names, kinds: &self.kinds };
+        let known = FailureFacts {
+            forms: flow.forms,
+            names: &flow.names,
+            kinds: &self.kinds,
+            interrupted: &self.interrupted,
+            resuming: &self.resuming_causes,
+        };
         let spot = |node: NodeId| Spot { form: code.form, node, context: code.context };
         let (handled, guard) = match kind {
             ScopeKind::Recovery { node, clauses, procedures } => {
@@ -195,7 +263,17 @@ impl Solution {
                     (0..clauses.len()).map(|one| of(one).cloned().unwrap_or_default()).collect();
                 let resumes: Vec<bool> =
                     (0..clauses.len()).map(|one| self.resuming.contains(&(code.form, *node, one))).collect();
-                (recover(&known, inside, clauses, &effects, &resumes), None)
+                let handled = recover(&known, inside, clauses, &effects, &resumes);
+                // What a clause does, it does in the code that has called it.
+                for (failure, clauses) in &handled.interrupted {
+                    let row = self.interrupted.entry(*failure).or_default();
+                    for clause in clauses {
+                        let before = row.failures.len();
+                        row.failures.extend(&effects[*clause].failures);
+                        self.has_found |= row.failures.len() != before;
+                    }
+                }
+                (handled, None)
             }
             ScopeKind::Cases { node, types } => (take(&known, inside, types), Some(spot(*node))),
             ScopeKind::Handlers { node, types } => {
@@ -204,7 +282,7 @@ impl Solution {
                 let mut all = LeavingFailures::default();
                 all.add(inside);
                 let is_new = self.caught.entry(spot(*node)).or_default().add(&all);
-                self.has_caught |= is_new;
+                self.has_found |= is_new;
                 (handled, None)
             }
             ScopeKind::ClauseBody(_) => return inside.clone(),
@@ -216,7 +294,7 @@ impl Solution {
                 mistakes: handled.mistakes.iter().fold(0, |all, one| all | one),
                 ..LeavingFailures::default()
             };
-            self.has_caught |= caught.add(&all);
+            self.has_found |= caught.add(&all);
         }
         let leaving = handled.leaving.clone();
         self.handled.insert((number, scope), handled);
@@ -285,6 +363,9 @@ impl Solution {
                 return self.by_cause(&ends);
             }
             NodeEffect::Again(guard) => return self.caught.get(&guard).cloned().unwrap_or_default(),
+            NodeEffect::Interrupts(_) | NodeEffect::InterruptsBy(_) => {}
+            NodeEffect::Jump => leaving.jumps = true,
+            NodeEffect::Wait => leaving.waits = true,
             NodeEffect::Mistake(kinds) => leaving.mistakes = kinds,
         }
         leaving

@@ -68,15 +68,15 @@ impl ValueFlow<'_> {
             "%CALL-WITH-LIMIT" => {
                 self.call_argument(call, 2, &[]);
                 if !self.is_absent(call, 0) {
-                    self.fail(spot, "TIMEOUT");
+                    self.interrupt(spot, "TIMEOUT");
                 }
                 if !self.is_absent(call, 1) {
-                    self.fail(spot, "BUDGET-EXHAUSTED");
+                    self.interrupt(spot, "BUDGET-EXHAUSTED");
                 }
             }
             "%CALL-WITH-QUOTA" => {
                 self.call_argument(call, 1, &[]);
-                self.fail(spot, "QUOTA-EXHAUSTED");
+                self.interrupt(spot, "QUOTA-EXHAUSTED");
             }
             "%WAIT-UNTIL" => {
                 self.call_argument(call, 0, &[]);
@@ -101,6 +101,7 @@ impl ValueFlow<'_> {
                     self.watch(events, FlowWatcher::Contents(call.value));
                 }
             }
+            "NEXT-BINDINGS" => self.note(spot, NodeEffect::Jump),
             "%CALL-WITH-QUERY-BINDINGS" => {
                 self.call_argument(call, 2, &[]);
                 self.call_tests(call, 0);
@@ -122,7 +123,7 @@ impl ValueFlow<'_> {
             "%CALL-WITH-RESOURCES" => self.with_resources(call),
             "%CALL-WITH-FLEET-RESOURCES" => {
                 self.with_resources(call);
-                self.fail(spot, "LEASE-LOST");
+                self.interrupt(spot, "LEASE-LOST");
             }
             "%ACQUIRE" => {
                 if self.quoted(call, 1).is_none_or(|denied| denied.name() == "FAIL") {
@@ -140,6 +141,7 @@ impl ValueFlow<'_> {
                 let any = call.arguments.given.iter().map(|(cell, _)| *cell).collect();
                 let arguments = CallArguments { any, ..CallArguments::default() };
                 self.call_values(spot, restarts, arguments, Some(call.value), Passing::Through, true);
+                self.note(spot, NodeEffect::Jump);
             }
             _ => return false,
         }
@@ -280,14 +282,10 @@ impl ValueFlow<'_> {
             self.watch(key, FlowWatcher::Contents(names));
             self.watch(names, FlowWatcher::Lock(spot));
         }
-        for cause in [
-            "PROPERTY-LOCK-UNAVAILABLE",
-            "CONDITION-NOT-ACHIEVED",
-            "MAINTAINED-PROPERTY-VIOLATION",
-            "UNRECOVERABLE-PROPERTY-VIOLATION",
-        ] {
-            self.fail(spot, cause);
-        }
+        self.fail(spot, "PROPERTY-LOCK-UNAVAILABLE");
+        self.fail(spot, "CONDITION-NOT-ACHIEVED");
+        self.interrupt(spot, "MAINTAINED-PROPERTY-VIOLATION");
+        self.interrupt(spot, "UNRECOVERABLE-PROPERTY-VIOLATION");
     }
 
     /// Achieves the property `value` for a lock: a failure of its methods is one of the condition then.
@@ -309,13 +307,13 @@ impl ValueFlow<'_> {
             esl_compiler::children(form.kind(node), &mut |child| pending.push(child));
         }
         let has = |word: &str| call.nodes.is_empty() || words.iter().any(|known| known == word);
-        let (timeout, denied, preemptible) = (has("TIMEOUT"), has("IF-DENIED"), has("PREEMPTIBLE"));
-        for (is_possible, cause) in
-            [(timeout, "TIMEOUT"), (denied, "RESOURCE-DENIED"), (preemptible, "RESOURCE-PREEMPTED")]
-        {
-            if is_possible {
+        for (word, cause) in [("TIMEOUT", "TIMEOUT"), ("IF-DENIED", "RESOURCE-DENIED")] {
+            if has(word) {
                 self.fail(call.spot, cause);
             }
+        }
+        if has("PREEMPTIBLE") {
+            self.interrupt(call.spot, "RESOURCE-PREEMPTED");
         }
     }
 }

@@ -72,6 +72,9 @@ impl ValueFlow<'_> {
         {
             self.fail(spot, "PERMISSION-DENIED");
         }
+        if rows::may_wait(call.name) {
+            self.note(spot, NodeEffect::Wait);
+        }
         if row.mistakes != 0 {
             self.note(spot, NodeEffect::Mistake(row.mistakes));
         }

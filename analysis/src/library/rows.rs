@@ -355,6 +355,27 @@ pub(crate) fn function_positions(name: &str) -> &'static [usize] {
     }
 }
 
+/// Whether a function may wait, although it may have no failures.
+pub(super) fn may_wait(name: &str) -> bool {
+    name.contains("WAIT")
+        || matches!(
+            name,
+            "SLEEP"
+                | "%ACQUIRE"
+                | "%CALL-WITH-RESOURCES"
+                | "%CALL-WITH-FLEET-RESOURCES"
+                | "%CALL-HOST"
+                | "%CALL-MAINTAINING"
+                | "%END-LIKE"
+                | "%PERFORM"
+                | "%PERFORM-EXCLUSIVELY"
+                | "%SUPERVISE"
+                | "%TASK-END"
+                | "%TASK-VALUE"
+                | "OPERATION-RESULT"
+        )
+}
+
 /// Returns the row of a function.
 pub(crate) fn find(name: &str) -> LibraryRow {
     let causes = FAILING.iter().find(|(known, _)| *known == name).map_or(&[][..], |(_, causes)| *causes);

@@ -87,7 +87,10 @@ impl ValueFlow<'_> {
                     let work = self.begin(spot, 0, TaskKind::Guard, guard);
                     self.works[work.index()].is_awaited = true;
                 }
-                self.call_argument(call, 1, &[]);
+                if let Some(alarm) = call.argument(1) {
+                    let arguments = CallArguments::default();
+                    self.call_values(spot, alarm, arguments, None, Passing::Interrupting, true);
+                }
                 self.call_argument(call, 2, &[]);
             }
             "%DEFINE-TEST" => {

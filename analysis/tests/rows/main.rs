@@ -1,6 +1,8 @@
 //! Rows of small programs: the causes that leave functions and tasks, as the semantics of the language has
 //! it.
 
+mod spent;
+
 use esl::program::{Source, compile_with_core};
 use esl_analysis::{AnalysisOptions, CauseRow, FailureTable, analyze};
 
@@ -51,36 +53,16 @@ fn a_clause_whose_number_is_computed_may_never_run() {
 }
 
 #[test]
-fn a_clause_is_spent_if_another_begins_again_for_its_failure() {
-    let clause = |limit: &str| {
-        format!(
-            "(defun f () (with-recovery-procedures ((:a {limit} (fail :b)) (:b :retries 2 (retry))) (fail :a)))"
-        )
-    };
-    check(&clause(""), ":a :b");
-    check(&clause(":retries :infinite"), ":b");
-}
-
-#[test]
-fn a_cleanup_fails_while_control_leaves_for_a_clause_that_is_spent() {
-    let with = |clauses: &str| {
-        format!("(defun f () (with-recovery-procedures ({clauses}) (unwind-protect (fail :a) (fail :b))))")
-    };
-    check(&with("(:general-failure (abort 1))"), ":b");
-    check(&with("(:a (abort 1)) (:b :retries :infinite (abort 2))"), "");
-    check(&with("(:general-failure :retries :infinite (abort 1))"), "");
-    // The cleanup of a function; a handler is in force until control has left.
-    check(
-        "(defun work () (unwind-protect (fail :a) (fail :b)))
-         (defun f () (with-recovery-procedures ((:general-failure (abort 1))) (work)))",
-        ":b",
+fn many_clauses_are_told_apart() {
+    let causes: String = (0..300).map(|cause| format!("(:c{cause} (abort {cause}))")).collect();
+    let fails: String = (0..300).map(|cause| format!("(when (= n {cause}) (fail :c{cause}))")).collect();
+    let text = format!(
+        "(defun f (n) (with-recovery-procedures ((:a (retry)) {causes} (:b (fail :c))) {fails} (fail :a) (fail :b)))"
     );
-    check("(defun f () (handler-case (unwind-protect (fail :a) (fail :b)) (failure () 1)))", "");
-    // A cleanup that runs before the search goes on has spent nothing.
-    check(
-        "(defun f () (with-recovery-procedures ((:b (abort 1))) (with-cleanup-procedure (fail :b) (fail :a))))",
-        ":a",
-    );
+    check(&text, ":a :c");
+    let answers: Vec<String> = table(&text).clauses.into_iter().map(|clause| clause.answer).collect();
+    let ends = answers.iter().filter(|answer| *answer == "ends the form").count();
+    assert_eq!((answers.len(), ends, answers[301].as_str()), (302, 300, "leaves otherwise"), "{answers:?}");
 }
 
 #[test]
