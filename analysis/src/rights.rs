@@ -23,13 +23,16 @@ enum CallObject {
     Url(usize),
     /// A path or a name.
     Text(usize),
+    /// A pattern of paths, whose folder is read.
+    Pattern(usize),
     /// A command: a list whose first element is the program.
     Command(usize),
     /// A path that is read, or written if the keyword `:direction` says so.
     File(usize),
 }
 
-/// Package and name of a function, the rights that it needs, and their object.
+/// Package and name of a function, the rights that it needs, and their object. A function that needs rights
+/// to two objects has two rows.
 type RightsRow = (&'static str, &'static str, &'static [&'static str], CallObject);
 
 const ROWS: &[RightsRow] = &[
@@ -55,10 +58,12 @@ const ROWS: &[RightsRow] = &[
     ("COMMON-LISP", "OPEN", &[], CallObject::File(0)),
     ("COMMON-LISP", "LOAD", &["read"], CallObject::Text(0)),
     ("COMMON-LISP", "PROBE-FILE", &["read"], CallObject::Text(0)),
-    ("COMMON-LISP", "DIRECTORY", &["read"], CallObject::Text(0)),
+    ("COMMON-LISP", "TRUENAME", &["read"], CallObject::Text(0)),
+    ("COMMON-LISP", "DIRECTORY", &["read"], CallObject::Pattern(0)),
     ("COMMON-LISP", "FILE-WRITE-DATE", &["read"], CallObject::Text(0)),
     ("COMMON-LISP", "DELETE-FILE", &["write"], CallObject::Text(0)),
     ("COMMON-LISP", "RENAME-FILE", &["write"], CallObject::Text(0)),
+    ("COMMON-LISP", "RENAME-FILE", &["write"], CallObject::Text(1)),
     ("COMMON-LISP", "ENSURE-DIRECTORIES-EXIST", &["write"], CallObject::Text(0)),
     ("ESL", "WATCH-PATH", &["read"], CallObject::Text(0)),
 ];
@@ -115,9 +120,18 @@ impl NeededRights {
         let mut text = String::new();
         // Writing to a text does not fail.
         self.flags.iter().for_each(|flag| _ = writeln!(text, "{flag}"));
-        self.unknown.iter().for_each(|line| _ = writeln!(text, "# not known: {line}"));
+        for line in &self.unknown {
+            // The name of a file may have a line break, and what follows would be a flag.
+            _ = writeln!(text, "# not known: {}", line.replace(char::is_control, " "));
+        }
         text
     }
+}
+
+/// Returns whether an object can be the value of a flag, which is one line, and whose values have commas
+/// between them.
+fn is_value(object: &str) -> bool {
+    !object.is_empty() && object.trim() == object && !object.contains(|c: char| c == ',' || c.is_control())
 }
 
 /// Returns the rights that a program needs, from its top-level forms and their sources.
@@ -181,15 +195,29 @@ fn add_call(
         add_session(core, row, arguments, place, needed);
         return;
     }
-    let row = ROWS.iter().find(|(package, name, ..)| symbol.name() == *name && symbol.is_in(package));
-    let Some((package, name, rights, object)) = row else { return };
+    for row in ROWS.iter().filter(|(package, name, ..)| symbol.name() == *name && symbol.is_in(package)) {
+        add_row(core, row, arguments, place, needed);
+    }
+}
+
+/// Adds the rights to one object of a call.
+fn add_row(
+    core: &Core,
+    (package, name, rights, object): &RightsRow,
+    arguments: Option<&Vec<NodeId>>,
+    place: &dyn Fn() -> String,
+    needed: &mut NeededRights,
+) {
     let text = |position: usize| {
         let node = arguments?.get(position)?;
         constant_text(core, *node)
     };
     let (rights, found) = match *object {
         CallObject::Address(host, port) => {
-            let address = text(host).map(|host| match text(port) {
+            // An address of IPv6 has colons of its own.
+            let bare = |host: &String| host.contains(':') && !host.starts_with('[');
+            let host = text(host).map(|host| if bare(&host) { format!("[{host}]") } else { host });
+            let address = host.map(|host| match text(port) {
                 Some(port) => format!("{host}:{port}"),
                 None => host,
             });
@@ -197,6 +225,7 @@ fn add_call(
         }
         CallObject::Url(position) => (rights.to_vec(), text(position).and_then(|url| address_of(&url))),
         CallObject::Text(position) => (rights.to_vec(), text(position)),
+        CallObject::Pattern(position) => (rights.to_vec(), text(position).map(|path| folder_of(&path))),
         CallObject::Command(position) => {
             let node = arguments.and_then(|arguments| arguments.get(position));
             (rights.to_vec(), node.and_then(|node| program_of(core, *node)))
@@ -206,8 +235,10 @@ fn add_call(
     for right in rights {
         match &found {
             Some(path) if matches!(right, "read" | "write") && is_below_here(path) => {}
-            Some(object) => _ = needed.flags.insert(format!("--allow-{right}={object}")),
-            None => {
+            Some(object) if is_value(object) => {
+                _ = needed.flags.insert(format!("--allow-{right}={object}"));
+            }
+            _ => {
                 let function = match *package {
                     "COMMON-LISP" | "ESL" => name.to_lowercase(),
                     package => format!("{package}:{name}").to_lowercase(),
@@ -243,9 +274,15 @@ fn add_session(
         unknown("net");
         return;
     }
-    let mut grant = |right: &str, object: &str| {
-        if !(matches!(right, "read" | "write") && is_below_here(object)) {
+    let mut without_flag = Vec::new();
+    let mut grant = |right: &'static str, object: &str| {
+        if matches!(right, "read" | "write") && is_below_here(object) {
+            return;
+        }
+        if is_value(object) {
             _ = needed.flags.insert(format!("--allow-{right}={object}"));
+        } else {
+            without_flag.push(right);
         }
     };
     for side in ["CONNECT", "LISTEN"] {
@@ -297,6 +334,7 @@ fn add_session(
             Some(None) => unknown("fleet"),
         }
     }
+    without_flag.into_iter().for_each(unknown);
 }
 
 /// Returns whether a node is the constant `NIL`.
@@ -374,10 +412,18 @@ fn directions(core: &Core, arguments: Option<&Vec<NodeId>>) -> Vec<&'static str>
     let Some(arguments) = arguments else { return vec!["read", "write"] };
     let keyword = |node: &NodeId| keyword(core, *node);
     let is_direction = |node: &NodeId| keyword(node).is_some_and(|key| key.name() == "DIRECTION");
-    let Some(position) = arguments.iter().position(is_direction) else { return vec!["read"] };
+    // One that is not there may be made.
+    let is_creation = |node: &NodeId| keyword(node).is_some_and(|key| key.name() == "IF-DOES-NOT-EXIST");
+    let makes = arguments.iter().position(is_creation).is_some_and(|position| {
+        let answer = arguments.get(position + 1);
+        !answer
+            .is_some_and(|node| is_nil(core, *node) || keyword(node).is_some_and(|key| key.name() == "ERROR"))
+    });
+    let read = || if makes { vec!["read", "write"] } else { vec!["read"] };
+    let Some(position) = arguments.iter().position(is_direction) else { return read() };
     let direction = arguments.get(position + 1).and_then(keyword);
     match direction.as_ref().map(Symbol::name) {
-        Some("INPUT" | "PROBE") => vec!["read"],
+        Some("INPUT" | "PROBE") => read(),
         Some("OUTPUT") => vec!["write"],
         _ => vec!["read", "write"],
     }
@@ -391,6 +437,11 @@ fn address_of(url: &str) -> Option<String> {
     let has_port = host.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
     let port = if matches!(scheme, "https" | "wss") { 443 } else { 80 };
     Some(if has_port { host.to_string() } else { format!("{host}:{port}") })
+}
+
+/// Returns the folder of a pattern of paths, which is what is read.
+fn folder_of(pattern: &str) -> String {
+    pattern.rfind('/').map_or(String::new(), |end| pattern[..=end].to_string())
 }
 
 /// Returns whether a path is below the folder in which the program is started, which needs no right.
@@ -408,6 +459,8 @@ mod tests {
         assert_eq!(address_of("wss://u:p@lab:8443/x").as_deref(), Some("lab:8443"));
         assert_eq!(address_of("https://lab").as_deref(), Some("lab:443"));
         assert_eq!(address_of("lab"), None);
+        assert_eq!(folder_of("/log/*.txt"), "/log/");
+        assert!(is_value("/a b#c") && !["", " a", "a,b", "a\n--allow-all"].into_iter().any(is_value));
         assert!(is_below_here("log/today.txt") && !is_below_here("../x") && !is_below_here("/etc/x"));
     }
 }

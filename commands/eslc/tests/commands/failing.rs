@@ -78,11 +78,18 @@ fn rights_are_listed_with_those_that_are_not_known() {
         (process:run-program '(\"calibrate\" \"--fast\"))
         (http:get \"https://lab/state\")
         (with-open-file (log \"/var/log/rover\" :direction :output) (print (talk 7) log))
-        (with-open-file (log \"notes.txt\") (read-line log))";
+        (with-open-file (log \"notes.txt\") (read-line log))
+        (probe-file \"/a\n--allow-all\") (probe-file \"/a,/etc\") (rename-file \"new.txt\" \"/var/old.txt\")
+        (directory \"/var/run/*.pid\") (directory \"*.esl\") (truename \"/var/link\")
+        (open \"/var/lock\" :if-does-not-exist :create) (sockets:listen \"::1\" 80)";
     let folder = Folder::with("failing-rights", &[("rover.esl", text)]);
     let (status, output, errors) = run(&folder, &["rights", "rover.esl"]);
-    let expected = "--allow-net=127.0.0.1\n--allow-net=lab:443\n--allow-run=calibrate\n--allow-write=/var/log/rover\n\
-                    # not known: --allow-net, for http:get at rover.esl:6:27\n";
+    let expected = "--allow-net=127.0.0.1\n--allow-net=[::1]:80\n--allow-net=lab:443\n--allow-read=/var/link\n\
+                    --allow-read=/var/lock\n--allow-read=/var/run/\n--allow-run=calibrate\n--allow-write=/var/lock\n\
+                    --allow-write=/var/log/rover\n--allow-write=/var/old.txt\n\
+                    # not known: --allow-net, for http:get at rover.esl:6:27\n\
+                    # not known: --allow-read, for probe-file at rover.esl:11:9\n\
+                    # not known: --allow-read, for probe-file at rover.esl:12:15\n";
     assert_eq!((status, output.as_str()), (Some(0), expected), "{errors}");
 }
 
