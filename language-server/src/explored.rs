@@ -23,6 +23,8 @@ pub(super) const FINDINGS: &str = ".findings.json";
 const MOST_BYTES: u64 = 8 << 20;
 /// Most findings that are shown in a text.
 const MOST_FINDINGS: usize = 50;
+/// Most steps of a finding that are shown: the last ones.
+const MOST_STEPS: usize = 1000;
 
 /// Returns the marks of findings in a text. Their files are in its folder, or in those of the workspace.
 pub(super) fn marks(uri: &Uri, text: &str, unit: ColumnUnit, roots: &[PathBuf]) -> Vec<ShownDiagnostic> {
@@ -40,8 +42,7 @@ pub(super) fn marks(uri: &Uri, text: &str, unit: ColumnUnit, roots: &[PathBuf]) 
     let mut marker = FindingMarker { path: &path, unit, texts: HashMap::new(), marks: Vec::new() };
     let mut count = 0;
     for file in files {
-        let Some(json) = fs::read(&file).ok().and_then(|bytes| serde_json::from_slice::<Json>(&bytes).ok())
-        else {
+        let Some(json) = read(&file).and_then(|text| serde_json::from_str::<Json>(&text).ok()) else {
             continue;
         };
         let folder = PathBuf::from(json["folder"].as_str().unwrap_or_default());
@@ -59,7 +60,13 @@ pub(super) fn marks(uri: &Uri, text: &str, unit: ColumnUnit, roots: &[PathBuf]) 
 /// Returns the text of a file, and when it was changed.
 fn stored(path: &Path) -> Option<(String, SystemTime)> {
     let changed = fs::metadata(path).ok()?.modified().ok()?;
-    Some((fs::read_to_string(path).ok()?, changed))
+    Some((read(path)?, changed))
+}
+
+/// Returns the text of a file that is not too large. To read a pipe or a device might never end.
+fn read(path: &Path) -> Option<String> {
+    let found = fs::metadata(path).ok()?;
+    if found.is_file() && found.len() <= MOST_BYTES { fs::read_to_string(path).ok() } else { None }
 }
 
 /// Returns the files with findings in a folder that were written at a time or later.
@@ -67,9 +74,7 @@ fn files_in(folder: &Path, since: SystemTime) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let entries = entries.flatten().filter(|entry| entry.file_name().to_string_lossy().ends_with(FINDINGS));
     let is_wanted = |entry: &fs::DirEntry| {
-        entry.metadata().is_ok_and(|found| {
-            found.len() <= MOST_BYTES && found.modified().is_ok_and(|written| written >= since)
-        })
+        fs::metadata(entry.path()).is_ok_and(|found| found.modified().is_ok_and(|written| written >= since))
     };
     entries.filter(is_wanted).map(|entry| entry.path()).collect()
 }
@@ -102,7 +107,7 @@ impl FindingMarker<'_> {
         let path = fs::canonicalize(folder.join(parts.next()?)).ok()?;
         let unit = self.unit;
         let load = |path: &Path| {
-            let text = fs::read_to_string(path).ok()?;
+            let text = read(path)?;
             Some(OpenText::new(uri_of(path)?, 0, text, unit))
         };
         let text = self.texts.entry(path.clone()).or_insert_with(|| load(&path)).as_ref()?;
@@ -115,10 +120,13 @@ impl FindingMarker<'_> {
         Some((path, text.location(start..end)))
     }
 
-    /// Returns the steps of a finding that have a place.
-    fn steps(&mut self, finding: &Json, folder: &Path) -> Vec<MarkedStep> {
+    /// Returns the number of the first steps of a finding that are left out, and those of the others that have
+    /// a place.
+    fn steps(&mut self, finding: &Json, folder: &Path) -> (usize, Vec<MarkedStep>) {
         let mut steps = Vec::new();
-        for step in finding["steps"].as_array().into_iter().flatten() {
+        let all = finding["steps"].as_array().map_or(&[][..], Vec::as_slice);
+        let left_out = all.len().saturating_sub(MOST_STEPS);
+        for step in &all[left_out..] {
             let standing = ["stops", "ends", "chooses"].iter().find_map(|key| step.get(key)).unwrap_or(step);
             let (Some(task), Some(place), Some(text)) =
                 (standing["task"].as_str(), standing["place"].as_str(), step["text"].as_str())
@@ -131,14 +139,14 @@ impl FindingMarker<'_> {
                 steps.push(MarkedStep { text, is_switch, at });
             }
         }
-        steps
+        (left_out, steps)
     }
 
     fn mark(&mut self, finding: &Json, folder: &Path, program: &str) {
         let kind = if finding.get("fragile").is_some() { "fragile" } else { "finding" };
         let Some(what) = finding[kind].as_str() else { return };
         let command = if finding.get("test").is_some() { "eslvm test" } else { "eslvm explore" };
-        let steps = self.steps(finding, folder);
+        let (left_out, steps) = self.steps(finding, folder);
         let Some(main) = steps.iter().rposition(|step| step.is_switch).or(steps.len().checked_sub(1)) else {
             return;
         };
@@ -170,7 +178,8 @@ impl FindingMarker<'_> {
                 let related_information = Some(related.clone());
                 self.marks.push(ShownDiagnostic { related_information, ..mark });
             } else {
-                let message = format!("step {} of {}, {what}: {}", number + 1, steps.len(), step.text);
+                let (number, count) = (left_out + number + 1, left_out + steps.len());
+                let message = format!("step {number} of {count}, {what}: {}", step.text);
                 self.marks.push(shown(DiagnosticSeverity::INFORMATION, &step.at.1, message));
             }
         }

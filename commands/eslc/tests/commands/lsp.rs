@@ -451,8 +451,11 @@ fn findings_of_explorations_are_marked() {
         step("set", "task RIGHT", "count.esl:3:3", "sets *SEEN* to 1"),
         step("set", "task RIGHT", "missing.esl:3:3", "sets *SEEN* to 1"),
         step("set", "task RIGHT", "count.esl:99:3", "sets *SEEN* to 1"),
+        step("set", "task RIGHT", "pipe.findings.json:1:1", "is in a file that never ends"),
         json!(7),
     ]);
+    // To read it would wait for ever; where it cannot be made, the place is in no file.
+    _ = std::process::Command::new("mkfifo").arg(folder.join("pipe.findings.json")).status();
     let finding = json!({ "finding": "the program ends with status 1", "steps": steps, "schedule": "count-1.schedule" });
     let found = json!({ "folder": folder.path(), "program": "count.esl", "findings": [finding] });
     folder.file("count.findings.json", found.to_string());
@@ -476,7 +479,7 @@ fn findings_of_explorations_are_marked() {
     let finding = json!({ "finding": "COUNTING: a check did not hold", "test": "COUNTING", "steps": steps, "again": again });
     let found = json!({ "folder": folder.path(), "findings": [finding] });
     folder.file("count.findings.json", found.to_string());
-    editor.tell("workspace/didChangeWatchedFiles", json!({ "changes": [changed] }));
+    editor.tell("workspace/didChangeWatchedFiles", json!({ "changes": [&changed] }));
     let is_of_test =
         |told: &[Value]| told.len() == 3 && told.iter().all(|mark| mark["source"] == "eslvm test");
     let told = editor.diagnostics(&main, is_of_test);
@@ -485,6 +488,15 @@ fn findings_of_explorations_are_marked() {
         mark["message"].as_str().is_some_and(|text| text.ends_with(&format!("again: {again}"))),
         "{mark}"
     );
+    // Of one with many steps, the last are shown.
+    let many = vec![step("read", "task LEFT", "count.esl:3:20", "reads *SEEN* = 0"); 1200];
+    let finding = json!({ "finding": "a deadlock", "steps": many, "again": again });
+    let found = json!({ "folder": folder.path(), "findings": [finding] });
+    folder.file("count.findings.json", found.to_string());
+    editor.tell("workspace/didChangeWatchedFiles", json!({ "changes": [changed] }));
+    let told = editor.diagnostics(&main, |told| told.len() == 1000);
+    let first = "step 201 of 1200, a deadlock: LEFT: reads *SEEN* = 0";
+    assert!(told.iter().any(|mark| mark["message"] == first), "{}", told[0]);
     // The text is another one now.
     let change = json!({ "text": format!("{text}\n") });
     let document = json!({ "uri": uri(&main), "version": 2 });
