@@ -4,13 +4,14 @@
 use std::collections::BTreeSet;
 
 use esl_analysis::{CauseRow, HandlingForm, causes_of_function};
-use esl_syntax::{NodeId, SyntaxKind};
+use esl_syntax::{NodeId, SyntaxKind, SyntaxTree};
 use lsp_types::{CodeActionKind, CodeActionParams, CodeLens, Command, NumberOrString, TextEdit};
 
 use super::document::OpenText;
 use super::inferred::{InferredText, MovedPlaces};
 use super::library::language;
 use super::project::Project;
+use super::scope::{is_operator, template_level};
 
 /// Causes that a title names, of each sort.
 const MAX_CAUSES: usize = 5;
@@ -160,6 +161,36 @@ pub(super) fn note_of_form(project: &Project, text: &OpenText, node: NodeId) -> 
     Some(out)
 }
 
+/// Returns the end of a node, with a comment about it in the same line.
+fn end_with_comment(tree: &SyntaxTree, node: NodeId) -> usize {
+    let end = tree.range(node).end;
+    let rest = tree.source()[end..].lines().next().unwrap_or_default();
+    if rest.trim_start().starts_with(';') { end + rest.len() } else { end }
+}
+
+/// Returns blanks that are as wide as the text before a byte in its line.
+fn blanks_before(tree: &SyntaxTree, at: usize) -> String {
+    let before = &tree.source()[..at];
+    let line = &before[before.rfind('\n').map_or(0, |newline| newline + 1)..];
+    line.chars().map(|c| if c == '\t' { c } else { ' ' }).collect()
+}
+
+/// Returns whether a list whose operator is `name` is a form, as far as the text shows it: not data, a
+/// declaration, or the definition of a local function.
+fn is_form(tree: &SyntaxTree, list: NodeId, name: NodeId) -> bool {
+    if !is_operator(tree, name) || template_level(tree, list).is_none() {
+        return false;
+    }
+    let around = || std::iter::successors(tree.parent(list), |&node| tree.parent(node));
+    let operator = |node: NodeId| tree.operator(node).unwrap_or_default();
+    let is_declared = around().any(|node| matches!(&*operator(node), "declaim" | "declare" | "proclaim"));
+    let defines = |(definitions, form): (NodeId, NodeId)| {
+        matches!(&*operator(form), "flet" | "labels" | "macrolet")
+            && tree.data(form).nth(1) == Some(definitions)
+    };
+    !is_declared && !around().next().zip(around().nth(1)).is_some_and(defines)
+}
+
 /// Returns the edit that adds clauses to a form of recovery procedures.
 fn added(text: &OpenText, form: NodeId, causes: &[&str]) -> Option<TextEdit> {
     let tree = &text.tree;
@@ -169,10 +200,10 @@ fn added(text: &OpenText, form: NodeId, causes: &[&str]) -> Option<TextEdit> {
     let clauses = tree.data(form).nth(1).filter(|&list| tree.kind(list) == SyntaxKind::List)?;
     let clause = |cause: &&str| format!("({cause} :retries 1 (retry))");
     let (at, column, is_first) = match (tree.data(clauses).next(), tree.data(clauses).last()) {
-        (Some(first), Some(last)) => (tree.range(last).end, tree.range(first).start, false),
+        (Some(first), Some(last)) => (end_with_comment(tree, last), tree.range(first).start, false),
         _ => (tree.opening_end(clauses), tree.opening_end(clauses), true),
     };
-    let break_ = format!("\n{}", " ".repeat(text.position(column).character as usize));
+    let break_ = format!("\n{}", blanks_before(tree, column));
     let added = causes.iter().map(clause).collect::<Vec<_>>().join(&break_);
     let new = if is_first { added } else { format!("{break_}{added}") };
     Some(TextEdit::new(text.range(at..at), new))
@@ -239,7 +270,7 @@ fn wrapped(
     let tree = &text.tree;
     let node = tree.node_at(at);
     let call = tree.list_around(node)?;
-    if tree.data(call).next() != Some(node) || !tree.is_closed(call) {
+    if tree.data(call).next() != Some(node) || !tree.is_closed(call) || !is_form(tree, call, node) {
         return None;
     }
     let name = tree.operator(call)?;
@@ -250,9 +281,9 @@ fn wrapped(
         return None;
     }
     let range = tree.range(call);
-    let column = text.position(range.start).character as usize;
+    let blanks = blanks_before(tree, range.start);
     let clauses: Vec<String> = causes.iter().map(|cause| format!("({cause} :retries 1 (retry))")).collect();
-    let between = format!("\n{}", " ".repeat(column + "(with-recovery-procedures (".len()));
+    let between = format!("\n{blanks}{}", " ".repeat("(with-recovery-procedures (".len()));
     // A string of several lines would change with them.
     let has_long_string = tree.nodes().any(|node| {
         range.contains(&tree.range(node).start)
@@ -263,8 +294,7 @@ fn wrapped(
         true => tree.text(call).to_owned(),
         false => tree.text(call).replace('\n', "\n  "),
     };
-    let new =
-        format!("(with-recovery-procedures ({})\n{}{body})", clauses.join(&between), " ".repeat(column + 2));
+    let new = format!("(with-recovery-procedures ({})\n{blanks}  {body})", clauses.join(&between));
     let title = format!("Recover from {} here", listed(&causes));
     Some((title, CodeActionKind::REFACTOR, TextEdit::new(text.range(range), new)))
 }

@@ -84,8 +84,7 @@ fn repair(text: &OpenText, diagnostic: &Diagnostic) -> Option<(String, TextEdit)
         }
         ("unclosed-list", _) => {
             let list = tree.nodes().find(|&node| tree.range(node).start == start)?;
-            let end = tree.source()[..tree.range(list).end].trim_end().len();
-            Some(("Close the list with `)`".into(), insert(end, ")".into())))
+            Some(("Close the list with `)`".into(), insert(end_of_contents(tree, list), ")".into())))
         }
         ("undeclared-cause", Some(form)) => {
             let top = tree.data(SyntaxTree::ROOT).find(|&form| tree.range(form).contains(&start))?;
@@ -98,6 +97,17 @@ fn repair(text: &OpenText, diagnostic: &Diagnostic) -> Option<(String, TextEdit)
         }
         _ => None,
     }
+}
+
+/// Returns where the last thing in an unclosed list ends; comments may follow.
+fn end_of_contents(tree: &SyntaxTree, mut list: NodeId) -> usize {
+    while let Some(last) = tree.data(list).last() {
+        if tree.kind(last) != SyntaxKind::List || tree.is_closed(last) {
+            return tree.range(last).end;
+        }
+        list = last;
+    }
+    tree.opening_end(list)
 }
 
 /// Returns the name at a byte: itself, or the operator of the list that begins there.

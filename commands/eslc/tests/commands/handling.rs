@@ -134,3 +134,47 @@ fn an_editor_is_warned_of_clauses_and_orders() {
     assert_eq!(found[0].1, "resource-order");
     editor.end();
 }
+
+/// Repairs leave comments with what they are about, follow tabs, and are offered for calls only.
+#[test]
+fn repairs_keep_a_text_readable() {
+    let text = "(define-cause :a ())\n(define-cause :b ())\n(defun g (x) (if x (fail :a) (fail :b)))\n\
+        (declaim (fails (g f) :a :b))\n(defun f (x)\n\t(with-recovery-procedures ((:a (abort 1)) ; all of it\n\
+        \t\t)\n\t\t(flet ((g (x) x))\n\t\t\t(g x))\n\t\t(g x)))\n(print '(g 1))\n";
+    let folder = Folder::with("lsp_readable", &[("f.esl", text)]);
+    let path = folder.join("f.esl");
+    let mut editor = Editor::new(&folder);
+    editor.open(&path, text);
+    editor.refreshed();
+    let blanks = " ".repeat("(with-recovery-procedures (".len());
+    let clause = ("Add a clause for :b".to_owned(), format!("\n\t{blanks}(:b :retries 1 (retry))"));
+    assert_eq!(repairs(&mut editor, &path, (5, 3), &[]), [clause]);
+    let at = json!({ "line": 5, "character": 3 });
+    let asked = json!({
+        "textDocument": { "uri": uri(&path) }, "range": { "start": at, "end": at }, "context": { "diagnostics": [] },
+    });
+    let answer = editor.ask("textDocument/codeAction", asked);
+    let place = &answer[0]["edit"]["changes"][uri(&path)][0]["range"]["start"];
+    let line = text.lines().nth(5).expect("it is there");
+    assert_eq!(*place, json!({ "line": 5, "character": line.len() }), "behind the comment");
+    let wrapped = repairs(&mut editor, &path, (9, 3), &[]).remove(0).1;
+    assert!(
+        wrapped.contains(&format!("\n\t\t{blanks}(:b")) && wrapped.ends_with("\n\t\t  (g x))"),
+        "{wrapped}"
+    );
+    for (at, what) in [((3, 17), "a declaration"), ((7, 10), "a definition"), ((10, 9), "data")] {
+        assert_eq!(repairs(&mut editor, &path, at, &[]), [], "{what}");
+    }
+
+    let text = "(defun f ()\n  (list 1 ; one (\n";
+    let path = folder.join("open.esl");
+    editor.open(&path, text);
+    let told = editor.diagnostics(&path, |told| told.iter().any(|found| found["code"] == "unclosed-list"));
+    let context = json!({ "diagnostics": told });
+    let whole = &context["diagnostics"][0]["range"];
+    let asked = json!({ "textDocument": { "uri": uri(&path) }, "range": whole, "context": context });
+    let answer = editor.ask("textDocument/codeAction", asked);
+    let edit = &answer[0]["edit"]["changes"][uri(&path)][0];
+    assert_eq!(edit["range"]["start"], json!({ "line": 1, "character": 9 }), "before the comment: {answer}");
+    editor.end();
+}
