@@ -85,6 +85,11 @@ pub(crate) fn may_be_mistake(forms: &CoreForms, cause: &Symbol) -> bool {
     !cause.is_keyword() || is_mistake(cause.name()) || forms.redefines_mistakes
 }
 
+/// Returns whether a cause, as tables show it, is that of conditions of Lisp, such as `:type-error`.
+pub(crate) fn is_of_mistake(cause: &str) -> bool {
+    cause.strip_prefix(':').is_some_and(|name| is_mistake(&name.to_uppercase()))
+}
+
 /// Whether a cause or a type with this name is one of the standard.
 pub(crate) fn is_mistake(name: &str) -> bool {
     name == "T" || parents_of_standard(name).is_some()

@@ -6,10 +6,12 @@ use std::collections::BTreeMap;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::LambdaId;
+use esl_compiler::diagnostic::Sources;
 
-use crate::cause::{Applies, clause_applies, is_above_cause};
+use crate::cause::{Applies, clause_applies, is_above_cause, is_of_mistake};
 use crate::forms::{CoreForms, DeclaredCauses};
 use crate::guard::LeavingFailures;
+use crate::is_of_program;
 use crate::row::{FailingTask, FailureTable};
 use crate::table::{Maker, shown_function};
 use crate::value::{Code, NO_CONTEXT, TaskKind};
@@ -19,7 +21,8 @@ pub(crate) const SCRIPTED: &str = "scripted ";
 
 impl FailureTable {
     /// Returns the known causes of failures of functions and operations, such as `:timeout`, by the names of
-    /// these in lower case: those that the program shows, those of scripts of worlds, and declared ones.
+    /// these in lower case: those that the program shows, those of scripts of worlds, declared ones, and those
+    /// of functions of modules. What a module says of wrong arguments is left out.
     pub fn causes_by_name(&self) -> BTreeMap<String, Vec<String>> {
         let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
         let mut add = |name: &str, cause: &str| {
@@ -43,6 +46,10 @@ impl FailureTable {
         for (name, causes) in &self.declared {
             causes.iter().for_each(|cause| add(name, cause));
         }
+        let is_own = |name: &String| self.functions.iter().any(|function| function.name == *name);
+        for (name, causes) in self.of_modules.iter().filter(|(name, _)| !is_own(name)) {
+            causes.iter().filter(|cause| !is_of_mistake(cause)).for_each(|cause| add(name, cause));
+        }
         all
     }
 }
@@ -57,18 +64,23 @@ pub(crate) fn declared(forms: &CoreForms) -> BTreeMap<String, Vec<String>> {
 }
 
 /// Returns errors for the declarations of a program whose failures are not found: a promise that nothing has
-/// checked is not kept.
-pub(crate) fn unchecked(forms: &CoreForms) -> Vec<Diagnostic> {
+/// checked is not kept. Those that nothing ever checks, of functions of the host and of the library, are
+/// trusted here, too.
+pub(crate) fn unchecked(forms: &CoreForms, sources: &Sources) -> Vec<Diagnostic> {
     let found = |(name, declared): (&Symbol, &DeclaredCauses)| {
         let (form, node) = declared.place;
         let span = forms.forms[form].core.nodes[node.index()].span;
+        let is_compared = forms.defined.contains_key(name) || name.is_keyword() || name.name() == "MAIN";
+        if !is_compared || !is_of_program(sources, span) {
+            return None;
+        }
         let message = format!(
             "the failures declared for `{}` are not checked: too many functions flow through the program as values",
             shown_function(name)
         );
-        Diagnostic::new("undeclared-failure", Severity::Error, message, span)
+        Some(Diagnostic::new("undeclared-failure", Severity::Error, message, span))
     };
-    let mut findings: Vec<Diagnostic> = forms.declared.iter().map(found).collect();
+    let mut findings: Vec<Diagnostic> = forms.declared.iter().filter_map(found).collect();
     findings.sort_by_key(|found| (found.primary.span.source, found.primary.span.start));
     findings
 }

@@ -84,7 +84,7 @@ pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -
     let forms = CoreForms::new(cores);
     let mut findings = types::findings(&forms, sources);
     let Some(mut flow) = solved(&forms, Some(sources)) else {
-        findings.extend(declared::unchecked(&forms));
+        findings.extend(declared::unchecked(&forms, sources));
         let declared = declared::declared(&forms);
         let table = FailureTable { declared, findings, is_incomplete: true, ..FailureTable::default() };
         return (table, String::new());
@@ -170,6 +170,11 @@ fn solved<'a>(forms: &'a CoreForms, sources: Option<&Sources>) -> Option<ValueFl
     })
 }
 
+/// Returns whether a place is in the program, not in a module that comes with the system.
+fn is_of_program(sources: &Sources, span: Span) -> bool {
+    !sources.name(span.source).is_some_and(|name| name.starts_with(MODULE_SOURCES))
+}
+
 /// Looks at the program's own functions without a call, and at those that call their arguments, apart
 /// from any call.
 fn add_uncalled(flow: &mut ValueFlow<'_>, sources: &Sources) {
@@ -178,7 +183,7 @@ fn add_uncalled(flow: &mut ValueFlow<'_>, sources: &Sources) {
     defined.sort_unstable();
     for (form, node) in defined {
         let span = forms.forms[form].core.nodes[node.index()].span;
-        if sources.name(span.source).is_some_and(|name| name.starts_with(MODULE_SOURCES)) {
+        if !is_of_program(sources, span) {
             continue;
         }
         let esl_compiler::core::NodeKind::Call(_, arguments) = forms.forms[form].kind(node) else { continue };

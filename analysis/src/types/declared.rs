@@ -81,7 +81,7 @@ pub(super) fn findings(walk: &TypeWalk<'_>, sources: &Sources) -> Vec<Diagnostic
                 _ => None,
             });
             let (Some(name), [Some(key), Some(declared)]) = (form.symbol(*name), constants) else { continue };
-            if !is_esl(key, "%FTYPE") || !super::finding::is_of_program(sources, node.span) {
+            if !is_esl(key, "%FTYPE") || !crate::is_of_program(sources, node.span) {
                 continue;
             }
             let Some(function) = walk.definitions.functions.get(name) else { continue };
@@ -116,7 +116,8 @@ pub(super) fn findings(walk: &TypeWalk<'_>, sources: &Sources) -> Vec<Diagnostic
             }
             if let [result] = results {
                 let types = type_of(result);
-                if types.and(summary.result).is_empty() {
+                // Whether a function never returns, as `nil` says, is not known of each.
+                if !types.is_empty() && types.and(summary.result).is_empty() {
                     let (declared, given) = (walk.noun(types), walk.noun(summary.result));
                     warn(format!("`{shown}` is declared to return {declared}, and returns {given}"), None);
                 }

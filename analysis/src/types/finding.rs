@@ -1,19 +1,12 @@
 //! Warnings about calls that cannot succeed.
 
-use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
 use esl_compiler::core::{NodeId, NodeKind};
-use esl_compiler::diagnostic::Sources;
 
 use super::calls::ArgumentNeed;
 use super::set::TypeSet;
 use super::walk::TypeWalk;
-
-/// Whether a place is in a text of the program, and not in a module that comes with the system.
-pub(super) fn is_of_program(sources: &Sources, span: Span) -> bool {
-    !sources.name(span.source).is_some_and(|name| name.starts_with(MODULE_SOURCES))
-}
 
 impl TypeWalk<'_> {
     /// Warns of an argument that its function cannot take.

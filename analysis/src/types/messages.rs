@@ -40,6 +40,8 @@ pub fn compare_message_fields(fields: MessageFields) {
 
 /// Package of the module.
 const PACKAGE: &str = "ROS";
+/// Functions of the module that define types.
+const DEFINING: [&str; 2] = ["DEFINE-MESSAGE", "DEFINITIONS"];
 /// Longest way from a use of a value back to its type.
 const LONGEST: u32 = 16;
 /// Fields that a message names.
@@ -110,6 +112,12 @@ impl MessageTypes {
                             }
                             _ => {}
                         }
+                    }
+                    // The program may define any type by them.
+                    NodeKind::Apply(Callee::Global(symbol), _) | NodeKind::FunctionRef(symbol)
+                        if is_of_module(symbol) && DEFINING.contains(&symbol.name()) =>
+                    {
+                        return None;
                     }
                     _ => {}
                 }

@@ -150,7 +150,7 @@ impl<'p> TypeWalk<'p> {
             self.form(form);
         }
         let mut found = self.found.take().unwrap_or_default();
-        found.retain(|found| super::finding::is_of_program(sources, found.primary.span));
+        found.retain(|found| crate::is_of_program(sources, found.primary.span));
         found
     }
 

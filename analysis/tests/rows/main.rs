@@ -438,7 +438,9 @@ fn functions_that_call_each_other(count: usize) -> String {
             format!("(push (lambda (x) (dolist (next *all*) (funcall next (list x {number} next)))) *all*)\n")
         })
         .collect();
-    format!("(defvar *all* nil)\n{makers}(defun more (x) (+ 1 x)) (print (more 'a)) (declaim (fails more))")
+    format!(
+        "(defvar *all* nil)\n{makers}(defun more (x) (+ 1 x)) (print (more 'a)) (declaim (fails more) (fails of-the-host :lost))"
+    )
 }
 
 #[test]

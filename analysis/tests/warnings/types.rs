@@ -175,6 +175,7 @@ fn declared_types_are_compared_with_inferred_ones() {
            | (ftype (function (t) (or list string)) size) | (defun size (x) (length x))"],
     );
     check_none("(declaim (ftype (function (number) (values number &optional)) f)) (defun f (n) (* 2 n))");
+    check_none("(declaim (ftype (function () nil) f)) (defun f () (error \"it never returns\"))");
     check_none(
         "(declaim (ftype (function (&rest t) t) f) (ftype function g)) (defun f (n) n) (defun g () 1)",
     );
