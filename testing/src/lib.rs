@@ -47,6 +47,8 @@ pub use crate::failing::FailingSchedule;
 const ALL_HELD: u8 = 100;
 const ONE_DID_NOT_HOLD: u8 = 101;
 const NO_CHECK: u8 = 102;
+/// What is said of a test without one.
+const WITHOUT_CHECK: &str = "it has no check: use IS, SIGNALS or FAILS";
 
 /// The setup of tests.
 #[derive(Clone, Debug, Default)]
@@ -469,7 +471,7 @@ fn verdict(ended: Ended, output: impl FnOnce() -> String) -> Verdict {
     let why = match ended {
         Ended::Normally(ALL_HELD) => return Verdict::Passed,
         Ended::Normally(ONE_DID_NOT_HOLD) => "a check did not hold".into(),
-        Ended::Normally(NO_CHECK) => "it has no check: use IS, SIGNALS or FAILS".into(),
+        Ended::Normally(NO_CHECK) => WITHOUT_CHECK.into(),
         Ended::Normally(status) => format!("it has ended the run with the status {status}"),
         Ended::Failed => "a failure has left it".into(),
         Ended::HeapExhausted => "its memory is exhausted".into(),

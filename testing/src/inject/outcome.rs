@@ -5,7 +5,7 @@ use esl::program::Ended;
 use super::RunBound;
 use super::properties::left;
 use super::run::InjectedRun;
-use crate::{ALL_HELD, ONE_DID_NOT_HOLD};
+use crate::{ALL_HELD, NO_CHECK, ONE_DID_NOT_HOLD, WITHOUT_CHECK};
 
 /// Outcome of a run with faults.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -133,6 +133,7 @@ pub(super) fn problem(run: &InjectedRun, is_test: bool) -> Option<String> {
     match run.ended {
         Ended::Normally(status) if status == wanted => None,
         Ended::Normally(ONE_DID_NOT_HOLD) if is_test => Some("a check did not hold".into()),
+        Ended::Normally(NO_CHECK) if is_test => Some(WITHOUT_CHECK.into()),
         Ended::Normally(status) => Some(format!("it ends with the status {status}")),
         Ended::Deadlocked => Some(format!("deadlock: {}", waits(&run.errors))),
         Ended::BudgetSpent => Some("its budget of ticks is spent".into()),

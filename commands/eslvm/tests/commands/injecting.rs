@@ -84,12 +84,31 @@ fn wrong_names_and_tests_that_fail_are_told() {
     let (status, output) = test(&folder, &["--inject", "t.esl"]);
     let problem = "  its undisturbed run is not one to compare with: a check did not hold\n";
     assert!(status == Some(1) && output.ends_with(problem), "{output}");
+    folder.file("empty.esl", "(deftest empty)");
+    let (_, output) = test(&folder, &["--inject", "empty.esl"]);
+    assert!(output.contains(" it has no check: "), "{output}");
     let (status, output) = test(&folder, &["--inject-only", "look#9:melted", "good.esl"]);
     assert!(status == Some(2) && output.contains("no fault is called `look#9:melted`"), "{output}");
     let (_, output) = test(&folder, &["--inject", "--filter", "idle", "good.esl"]);
     assert!(output.ends_with("  undisturbed: 0.0 s; no operation is called\n"), "{output}");
     let (status, output) = test(&folder, &["--inject", "--filter", "nothing", "good.esl"]);
     assert_eq!(status, Some(5), "{output}");
+}
+
+/// A function of a module that a world answers fails as the module does, but not as for wrong arguments.
+#[test]
+fn functions_of_modules_fail_with_their_causes() {
+    let folder = Folder::new("injecting-modules");
+    let text = "(require :http)
+        (deftest asks
+          (with-world ((:answer (http:get *) :with \"x\"))
+            (is (equal (http:get \"http://lab/\") \"x\"))))";
+    folder.file("ask.esl", text);
+    let (_, output) = test(&folder, &["--inject", "ask.esl"]);
+    for cause in ["http-error", "socket-error", "timeout", "never"] {
+        assert!(output.contains(&format!("\n  get#1:{cause} ")), "{cause}: {output}");
+    }
+    assert!(!output.contains("type-error") && !output.contains("simple-error"), "{output}");
 }
 
 /// The spacecraft of the examples with the faults of its world. Two rows are bad, which empty the battery:
