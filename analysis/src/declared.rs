@@ -21,8 +21,8 @@ pub(crate) const SCRIPTED: &str = "scripted ";
 
 impl FailureTable {
     /// Returns the known causes of failures of functions and operations, such as `:timeout`, by the names of
-    /// these in lower case: those that the program shows, those of scripts of worlds, declared ones, and those
-    /// of functions of modules. What a module says of wrong arguments is left out.
+    /// these in lower case: those that the program shows, those of scripts of worlds, declared ones, and
+    /// those of functions of modules. Failures of a module because of wrong arguments are left out.
     pub fn causes_by_name(&self) -> BTreeMap<String, Vec<String>> {
         let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
         let mut add = |name: &str, cause: &str| {

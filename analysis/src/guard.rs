@@ -26,8 +26,8 @@ pub(crate) struct LeavingFailures {
     pub(crate) late_mistakes: u8,
     /// Failures that interrupt code, and that a form inside takes, so that control goes on there.
     pub(crate) stopped: BTreeSet<FailureId>,
-    /// Failures that leave a form inside which takes a late one: while control leaves for a clause that has taken
-    /// one of these, a cleanup may have that form go on.
+    /// Failures that leave a form inside which takes a late one: while control leaves for a clause that has
+    /// taken one of these, a cleanup may have that form go on.
     pub(crate) crossed: BTreeSet<FailureId>,
     /// Whether control may leave for a place around the failure that the code runs for.
     pub(crate) jumps: bool,
@@ -36,8 +36,8 @@ pub(crate) struct LeavingFailures {
 }
 
 impl LeavingFailures {
-    /// Has all of them be late, as those of a cleanup are. A failure that is taken there has the cleanup go on,
-    /// not the code that control leaves.
+    /// Has all of them be late, as those of a cleanup are. A failure that is taken there has the cleanup go
+    /// on, not the code that control leaves.
     pub(crate) fn delay(&mut self) {
         self.stopped.clear();
         self.crossed.clear();

@@ -264,7 +264,7 @@ impl Solution {
                 let resumes: Vec<bool> =
                     (0..clauses.len()).map(|one| self.resuming.contains(&(code.form, *node, one))).collect();
                 let handled = recover(&known, inside, clauses, &effects, &resumes);
-                // What a clause does, it does in the code that has called it.
+                // The effects of a clause are those of the code that has called it.
                 for (failure, clauses) in &handled.interrupted {
                     let row = self.interrupted.entry(*failure).or_default();
                     for clause in clauses {

@@ -1,8 +1,9 @@
-//! The clauses of a recovery form that apply to a failure, and those that may have been called before it comes.
+//! The clauses of a recovery form that apply to a failure, and those that may have been called before it
+//! comes.
 //!
-//! A clause with a limit that has been called before may be spent, so that the failure passes it. That is so if
-//! control comes back into the body after the clause, and if the failure begins while the clause runs. In doubt a
-//! clause counts as spent: how often it has run is not counted.
+//! A clause with a limit that has been called before may be spent, so that the failure passes it. That is so
+//! if control comes back into the body after the clause, and if the failure begins while the clause runs. In
+//! doubt a clause counts as spent: how often it has run is not counted.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -71,8 +72,8 @@ pub(crate) struct SpentClauses<'r> {
     resumes: &'r [bool],
     /// Clauses after which the body may go on or begin again, so that a later failure finds them spent.
     is_left: Vec<bool>,
-    /// For each point that control can reach, those from which it does. The points are the clauses, the cleanups
-    /// of the body, and the failures that interrupt it.
+    /// For each point that control can reach, those from which it does. The points are the clauses, the
+    /// cleanups of the body, and the failures that interrupt it.
     before: Vec<Vec<usize>>,
     /// Clauses that may run in code which a failure interrupts.
     interrupted: FxHashMap<FailureId, FxHashSet<usize>>,

@@ -120,8 +120,8 @@ impl FindingMarker<'_> {
         Some((path, text.location(start..end)))
     }
 
-    /// Returns the number of the first steps of a finding that are left out, and those of the others that have
-    /// a place.
+    /// Returns the number of the first steps of a finding that are left out, and those of the others that
+    /// have a place.
     fn steps(&mut self, finding: &Json, folder: &Path) -> (usize, Vec<MarkedStep>) {
         let mut steps = Vec::new();
         let all = finding["steps"].as_array().map_or(&[][..], Vec::as_slice);

@@ -47,7 +47,7 @@ pub use crate::failing::FailingSchedule;
 const ALL_HELD: u8 = 100;
 const ONE_DID_NOT_HOLD: u8 = 101;
 const NO_CHECK: u8 = 102;
-/// What is said of a test without one.
+/// The report of a test without one.
 const WITHOUT_CHECK: &str = "it has no check: use IS, SIGNALS or FAILS";
 
 /// The setup of tests.

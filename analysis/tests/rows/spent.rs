@@ -51,7 +51,7 @@ fn a_clause_is_passed_by_what_comes_while_it_runs() {
     check(&with("(:a (abort 1)) (:b :retries :infinite (fail :a))", cleanup), ":a");
     check(&with("(:a (abort 1)) (:b :retries :infinite (retry))", cleanup), ":a");
     check(&with("(:a (fail :b)) (:b (fail :c)) (:c (abort 1))", "(fail :a)"), "");
-    // What a form in the cleanup takes has the cleanup go on.
+    // A cleanup goes on after a failure that a form in it takes.
     let cleanup = "(unwind-protect (fail :a) (handler-case (fail :b) (failure () 1)))";
     check(&with("(:a (abort 1))", cleanup), "");
 }

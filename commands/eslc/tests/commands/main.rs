@@ -5,6 +5,7 @@ mod checking;
 mod editor;
 mod editors;
 mod failing;
+mod findings;
 mod frames;
 mod grammar;
 mod handling;
