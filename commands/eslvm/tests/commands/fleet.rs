@@ -308,6 +308,7 @@ fn three_rovers_in_processes_fetch_all_samples() {
 /// A request whose messages come in any order, with one loss, one copy or one restart at any point: the
 /// search ends, at a grain that sees the changes of tasks, but not all that they read.
 #[test]
+#[ignore = "takes half a minute of the processor: --ignored"]
 fn one_request_with_one_fault_ends_well_in_all_schedules() {
     let path = esl_conformance::root().join("robots/tests/explored/one_request.esl");
     let explored = process::run(eslvm(&["explore", "--grain", "changes"]).arg(path), "");
