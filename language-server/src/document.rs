@@ -60,6 +60,13 @@ impl OpenText {
         path_of(&self.uri)
     }
 
+    /// Returns the characters that end the first line, with which new lines end, too.
+    pub(super) fn line_end(&self) -> &'static str {
+        let source = self.tree.source();
+        let is_crlf = source.find('\n').is_some_and(|at| source[..at].ends_with('\r'));
+        if is_crlf { "\r\n" } else { "\n" }
+    }
+
     /// Returns the byte at a position; the end of a line or of the text for one that is beyond it.
     pub(super) fn offset(&self, position: Position) -> usize {
         self.offset_in(self.tree.source(), position)

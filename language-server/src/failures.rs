@@ -203,7 +203,7 @@ fn added(text: &OpenText, form: NodeId, causes: &[&str]) -> Option<TextEdit> {
         (Some(first), Some(last)) => (end_with_comment(tree, last), tree.range(first).start, false),
         _ => (tree.opening_end(clauses), tree.opening_end(clauses), true),
     };
-    let break_ = format!("\n{}", blanks_before(tree, column));
+    let break_ = format!("{}{}", text.line_end(), blanks_before(tree, column));
     let added = causes.iter().map(clause).collect::<Vec<_>>().join(&break_);
     let new = if is_first { added } else { format!("{break_}{added}") };
     Some(TextEdit::new(text.range(at..at), new))
@@ -281,9 +281,9 @@ fn wrapped(
         return None;
     }
     let range = tree.range(call);
-    let blanks = blanks_before(tree, range.start);
+    let (blanks, line_end) = (blanks_before(tree, range.start), text.line_end());
     let clauses: Vec<String> = causes.iter().map(|cause| format!("({cause} :retries 1 (retry))")).collect();
-    let between = format!("\n{blanks}{}", " ".repeat("(with-recovery-procedures (".len()));
+    let between = format!("{line_end}{blanks}{}", " ".repeat("(with-recovery-procedures (".len()));
     // A string of several lines would change with them.
     let has_long_string = tree.nodes().any(|node| {
         range.contains(&tree.range(node).start)
@@ -294,7 +294,7 @@ fn wrapped(
         true => tree.text(call).to_owned(),
         false => tree.text(call).replace('\n', "\n  "),
     };
-    let new = format!("(with-recovery-procedures ({})\n{blanks}  {body})", clauses.join(&between));
+    let new = format!("(with-recovery-procedures ({}){line_end}{blanks}  {body})", clauses.join(&between));
     let title = format!("Recover from {} here", listed(&causes));
     Some((title, CodeActionKind::REFACTOR, TextEdit::new(text.range(range), new)))
 }

@@ -48,7 +48,7 @@ fn repair(text: &OpenText, diagnostic: &Diagnostic) -> Option<(String, TextEdit)
     let help = diagnostic.data.as_ref().and_then(|data| data.get("help")?.as_str()).unwrap_or_default();
     let quoted = help.split('`').nth(1);
     let start = text.offset(diagnostic.range.start);
-    let tree = &text.tree;
+    let (tree, line_end) = (&text.tree, text.line_end());
     let insert = |at: usize, new: String| TextEdit::new(text.range(at..at), new);
     match (&**code, quoted) {
         ("undeclared-cause", Some(name)) if help.starts_with("did you mean") => {
@@ -89,11 +89,12 @@ fn repair(text: &OpenText, diagnostic: &Diagnostic) -> Option<(String, TextEdit)
         ("undeclared-cause", Some(form)) => {
             let top = tree.data(SyntaxTree::ROOT).find(|&form| tree.range(form).contains(&start))?;
             let at = tree.range(top).start;
-            Some((format!("Declare it: `{form}`"), insert(at, format!("{form}\n\n"))))
+            Some((format!("Declare it: `{form}`"), insert(at, format!("{form}{line_end}{line_end}"))))
         }
         ("unused-variable", Some(form)) => {
             let (at, column) = place_of_declarations(text, start)?;
-            Some((format!("Declare it: `{form}`"), insert(at, format!("\n{}{form}", " ".repeat(column)))))
+            let new = format!("{line_end}{}{form}", " ".repeat(column));
+            Some((format!("Declare it: `{form}`"), insert(at, new)))
         }
         _ => None,
     }

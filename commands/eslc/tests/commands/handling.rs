@@ -178,3 +178,42 @@ fn repairs_keep_a_text_readable() {
     assert_eq!(edit["range"]["start"], json!({ "line": 1, "character": 9 }), "before the comment: {answer}");
     editor.end();
 }
+
+/// The lines of repairs end as those of the text do.
+#[test]
+fn repairs_keep_the_ends_of_lines() {
+    let text = GRIP.replace('\n', "\r\n") + "(defun idle (force)\r\n  0)\r\n(grip\r\n  (+ 1 2))\r\n";
+    let folder = Folder::with("lsp_line_ends", &[("grip.esl", &text)]);
+    let path = folder.join("grip.esl");
+    let mut editor = Editor::new(&folder);
+    editor.open(&path, &text);
+    editor.refreshed();
+    let told = editor.diagnostics(&path, |told| told.iter().any(|found| found["code"] == "unused-variable"));
+    let unused = told.into_iter().filter(|found| found["code"] == "unused-variable").collect::<Vec<_>>();
+    for (at, diagnostics, count) in [((7, 5), &[][..], 1), ((12, 2), &[], 3), ((10, 13), &unused, 1)] {
+        let (title, new) = repairs(&mut editor, &path, at, diagnostics).remove(0);
+        let breaks = (new.matches("\r\n").count(), new.matches('\n').count());
+        assert_eq!(breaks, (count, count), "{title}: {new:?}");
+    }
+    editor.end();
+}
+
+/// A form that has no clause yet has a lens as well, and the repair that adds the first one.
+#[test]
+fn a_form_without_clauses_shows_its_failures() {
+    let text = "(define-cause :stuck ())
+(defun grip () (fail :stuck))
+(defun work ()
+  (with-recovery-procedures ()
+    (grip)))
+";
+    let folder = Folder::with("lsp_no_clauses", &[("grip.esl", text)]);
+    let path = folder.join("grip.esl");
+    let mut editor = Editor::new(&folder);
+    editor.open(&path, text);
+    editor.refreshed();
+    assert_eq!(lenses(&mut editor, &path), [("handles 0 of 1; not :stuck".to_owned(), 3)]);
+    let clause = ("Add a clause for :stuck".to_owned(), "(:stuck :retries 1 (retry))".to_owned());
+    assert_eq!(repairs(&mut editor, &path, (3, 4), &[]), [clause]);
+    editor.end();
+}
