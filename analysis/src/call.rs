@@ -119,7 +119,7 @@ impl ValueFlow<'_> {
         let symbol = self.symbol(name).clone();
         if self.forms.defined.contains_key(&symbol) {
             let function = self.cell(CellKey::Function(symbol));
-            self.watch(function, FlowWatcher::Call(CallPoint { symbols: false, ..point.clone() }.into()));
+            self.call_at(function, CallPoint { symbols: false, ..point.clone() });
         } else if is_of_library(&symbol) && point.passing == Passing::Through {
             // A name such as LIST is found among the causes too.
             let value = point.result.unwrap_or_else(|| self.at(point.spot));

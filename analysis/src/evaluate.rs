@@ -312,8 +312,7 @@ impl ValueFlow<'_> {
         passing: Passing,
         symbols: bool,
     ) {
-        let point = CallPoint { spot, arguments, result, passing, symbols };
-        self.watch(function, FlowWatcher::Call(point.into()));
+        self.call_at(function, CallPoint { spot, arguments, result, passing, symbols });
     }
 
     /// Has the functions be called that are in the objects of a cell.

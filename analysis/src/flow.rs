@@ -12,11 +12,12 @@ use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::NodeId;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::cells::{Cells, Sending};
 use crate::effect::NodeEffect;
 use crate::forms::CoreForms;
 use crate::value::{
-    CellId, CellKey, Code, ContextId, FlowValue, NO_CONTEXT, NameId, Numbering, Spot, TaskKind, TaskWork,
-    ThingId, ThingKey, WorkId, WorkKey,
+    CellId, CellKey, Code, ContextId, FlowValue, NO_CONTEXT, NameId, Numbering, PointId, Spot, TaskKind,
+    TaskWork, ThingId, ThingKey, WorkId, WorkKey,
 };
 
 /// Most calls in a context.
@@ -28,10 +29,8 @@ const MOST_CODE: usize = 20_000;
 const MOST_ARRIVALS: usize = 4_000_000;
 
 /// A place that looks at the values that arrive in a cell.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum FlowWatcher {
-    /// They flow on.
-    To(CellId),
     /// The contents of objects flow on.
     Contents(CellId),
     /// The first elements of objects flow on.
@@ -43,7 +42,7 @@ pub(crate) enum FlowWatcher {
     /// The values of this cell flow into objects.
     Store(CellId),
     /// Functions are called.
-    Call(Rc<CallPoint>),
+    Call(PointId),
     /// Conditions and causes fail at this spot.
     Fail(Spot),
     /// Tasks' failures are failures at this spot.
@@ -97,15 +96,6 @@ pub(crate) struct CallPoint {
     pub(crate) symbols: bool,
 }
 
-/// A cell.
-#[derive(Debug, Default)]
-struct FlowCell {
-    values: Vec<FlowValue>,
-    known: FxHashSet<FlowValue>,
-    watchers: Vec<FlowWatcher>,
-    watching: FxHashSet<FlowWatcher>,
-}
-
 /// A piece of code that may run.
 #[derive(Debug)]
 pub(crate) struct RunningCode {
@@ -114,25 +104,16 @@ pub(crate) struct RunningCode {
     pub(crate) effects: Vec<(NodeId, NodeEffect)>,
 }
 
-/// A value on its way.
-#[derive(Debug)]
-enum FlowArrival {
-    /// To all that watches a cell.
-    Cell(CellId, FlowValue),
-    /// To a new watcher.
-    Watcher(FlowWatcher, FlowValue),
-}
-
 /// The analysis under way.
 #[derive(Debug)]
 pub(crate) struct ValueFlow<'a> {
     pub(crate) forms: &'a CoreForms,
     /// Most calls in a context of this analysis.
     depth: usize,
-    /// Values that have been sent to watchers.
-    sent: usize,
-    pub(crate) cell_keys: Numbering<CellKey>,
-    cells: Vec<FlowCell>,
+    cell_keys: Numbering<CellKey>,
+    cells: Cells<FlowWatcher>,
+    values: Numbering<FlowValue>,
+    points: Numbering<Rc<CallPoint>>,
     pub(crate) names: Numbering<Symbol>,
     pub(crate) things: Numbering<ThingKey>,
     work_keys: Numbering<WorkKey>,
@@ -142,7 +123,6 @@ pub(crate) struct ValueFlow<'a> {
     pub(crate) running: Vec<RunningCode>,
     seen: FxHashSet<(Spot, NodeEffect)>,
     unread: VecDeque<usize>,
-    arrivals: VecDeque<FlowArrival>,
     /// Objects whose first elements are told apart from the others.
     exact: FxHashSet<ThingId>,
     /// Spots that fail with a computed cause.
@@ -162,9 +142,10 @@ impl<'a> ValueFlow<'a> {
         ValueFlow {
             forms,
             depth,
-            sent: 0,
             cell_keys: Numbering::default(),
-            cells: Vec::new(),
+            cells: Cells::new(),
+            values: Numbering::default(),
+            points: Numbering::default(),
             names: Numbering::default(),
             things: Numbering::default(),
             work_keys: Numbering::default(),
@@ -174,7 +155,6 @@ impl<'a> ValueFlow<'a> {
             running: Vec::new(),
             seen: FxHashSet::default(),
             unread: VecDeque::new(),
-            arrivals: VecDeque::new(),
             exact: FxHashSet::default(),
             computed: Vec::new(),
             calls_arguments: crate::hot::calling_their_arguments(forms),
@@ -192,7 +172,7 @@ impl<'a> ValueFlow<'a> {
     pub(crate) fn cell(&mut self, key: CellKey) -> CellId {
         let (number, is_new) = self.cell_keys.number(&key);
         if is_new {
-            self.cells.push(FlowCell::default());
+            self.cells.create();
         }
         CellId(number)
     }
@@ -252,34 +232,24 @@ impl<'a> ValueFlow<'a> {
 
     /// Adds a value to a cell.
     pub(crate) fn add(&mut self, cell: CellId, value: FlowValue) {
-        let place = &mut self.cells[cell.index()];
-        if place.known.insert(value) {
-            place.values.push(value);
-            self.arrivals.push_back(FlowArrival::Cell(cell, value));
-        }
+        let number = self.values.number(&value).0;
+        self.cells.add(cell, number);
     }
 
     /// Has the values of a cell flow to another one.
     pub(crate) fn copy(&mut self, from: CellId, to: CellId) {
-        if from != to {
-            self.watch(from, FlowWatcher::To(to));
-        }
+        self.cells.copy(from, to);
     }
 
     /// Has the values of a cell, and those that come, looked at.
     pub(crate) fn watch(&mut self, cell: CellId, watcher: FlowWatcher) {
-        let place = &mut self.cells[cell.index()];
-        if !place.watching.insert(watcher.clone()) {
-            return;
-        }
-        place.watchers.push(watcher.clone());
-        self.sent += place.values.len();
-        if self.sent > MOST_ARRIVALS {
-            return;
-        }
-        // Those on their way arrive in the new watcher too, which does no harm.
-        let values = place.values.iter();
-        self.arrivals.extend(values.map(|value| FlowArrival::Watcher(watcher.clone(), *value)));
+        self.cells.watch(cell, watcher);
+    }
+
+    /// Has the functions in a cell be called.
+    pub(crate) fn call_at(&mut self, function: CellId, point: CallPoint) {
+        let point = PointId(self.points.number(&Rc::new(point)).0);
+        self.watch(function, FlowWatcher::Call(point));
     }
 
     /// Notes an effect of a node.
@@ -340,7 +310,7 @@ impl<'a> ValueFlow<'a> {
 
     /// Returns whether the analysis was given up because too many values flow: what it has found is a part.
     pub(crate) fn was_given_up(&self) -> bool {
-        self.sent > MOST_ARRIVALS
+        self.cells.sent > MOST_ARRIVALS
     }
 
     /// Looks at all code and all values until there are no new ones, or too many.
@@ -351,34 +321,28 @@ impl<'a> ValueFlow<'a> {
                 self.read(code);
                 continue;
             }
-            match self.arrivals.pop_front() {
-                Some(FlowArrival::Cell(cell, value)) => {
-                    self.sent += self.cells[cell.index()].watchers.len();
-                    for index in 0..self.cells[cell.index()].watchers.len() {
-                        let watcher = self.cells[cell.index()].watchers[index].clone();
-                        self.arrive(&watcher, value);
-                    }
+            let Some(Sending { values, watchers }) = self.cells.next() else { return };
+            for watcher in watchers {
+                for value in values.iter() {
+                    self.arrive(watcher, self.values.keys[value as usize]);
                 }
-                Some(FlowArrival::Watcher(watcher, value)) => self.arrive(&watcher, value),
-                None => return,
             }
         }
     }
 
     /// Does as a watcher says with a value.
-    fn arrive(&mut self, watcher: &FlowWatcher, value: FlowValue) {
+    fn arrive(&mut self, watcher: FlowWatcher, value: FlowValue) {
         match watcher {
-            FlowWatcher::To(to) => self.add(*to, value),
             FlowWatcher::Contents(to) => {
                 if let FlowValue::Thing(thing) = value {
                     let contents = self.cell(CellKey::Contents(thing));
-                    self.copy(contents, *to);
+                    self.copy(contents, to);
                 }
             }
             FlowWatcher::First(to) => {
                 if let FlowValue::Thing(thing) = value {
                     let first = self.cell(CellKey::First(thing));
-                    self.copy(first, *to);
+                    self.copy(first, to);
                     if !self.exact.contains(&thing) {
                         let contents = self.cell(CellKey::Contents(thing));
                         self.copy(contents, first);
@@ -395,62 +359,65 @@ impl<'a> ValueFlow<'a> {
             FlowWatcher::AllContents(to) => {
                 if let FlowValue::Thing(thing) = value {
                     let contents = self.cell(CellKey::Contents(thing));
-                    self.copy(contents, *to);
-                    self.watch(contents, FlowWatcher::AllContents(*to));
+                    self.copy(contents, to);
+                    self.watch(contents, FlowWatcher::AllContents(to));
                 }
             }
             FlowWatcher::Store(from) => {
                 if let FlowValue::Thing(thing) = value {
                     let (first, contents) =
                         (self.cell(CellKey::First(thing)), self.cell(CellKey::Contents(thing)));
-                    self.copy(*from, contents);
-                    self.copy(*from, first);
+                    self.copy(from, contents);
+                    self.copy(from, first);
                 }
             }
-            FlowWatcher::Call(point) => self.call_value(point, value),
-            FlowWatcher::Fail(spot) => self.fail_with(*spot, value),
+            FlowWatcher::Call(point) => {
+                let point = self.points.keys[point.index()].clone();
+                self.call_value(&point, value);
+            }
+            FlowWatcher::Fail(spot) => self.fail_with(spot, value),
             FlowWatcher::FailAs(spot) => {
                 if let FlowValue::Work(work) = value {
                     self.works[work.index()].is_awaited = true;
-                    self.note(*spot, NodeEffect::FailAs(work));
+                    self.note(spot, NodeEffect::FailAs(work));
                 }
             }
             FlowWatcher::FailAll(spot) => {
                 if let FlowValue::Work(work) = value {
                     self.works[work.index()].is_awaited = true;
-                    self.note(*spot, NodeEffect::FailAll(work));
+                    self.note(spot, NodeEffect::FailAll(work));
                 }
             }
             FlowWatcher::ValuesOf(to) => {
                 if let FlowValue::Work(work) = value {
                     let body = self.cell(CellKey::Body(work));
-                    self.watch(body, FlowWatcher::ValuesOf(*to));
+                    self.watch(body, FlowWatcher::ValuesOf(to));
                 } else if let FlowValue::Closure(code) = value {
                     let result = self.cell(CellKey::Return(code));
-                    self.copy(result, *to);
+                    self.copy(result, to);
                 }
             }
             FlowWatcher::Causes(to) => match value {
-                FlowValue::Caught(spot) => self.add(*to, FlowValue::CauseOfCaught(spot)),
-                FlowValue::Condition(name) => self.add(*to, FlowValue::CauseOf(name)),
-                FlowValue::EndOf(_) | FlowValue::AnySymbol => self.add(*to, value),
+                FlowValue::Caught(spot) => self.add(to, FlowValue::CauseOfCaught(spot)),
+                FlowValue::Condition(name) => self.add(to, FlowValue::CauseOf(name)),
+                FlowValue::EndOf(_) | FlowValue::AnySymbol => self.add(to, value),
                 _ => {}
             },
             FlowWatcher::Ends(to) => {
                 if let FlowValue::Work(work) = value {
                     self.works[work.index()].is_awaited = true;
-                    self.add(*to, FlowValue::EndOf(work));
+                    self.add(to, FlowValue::EndOf(work));
                     let body = self.cell(CellKey::Body(work));
-                    self.watch(body, FlowWatcher::ValuesOf(*to));
+                    self.watch(body, FlowWatcher::ValuesOf(to));
                 }
             }
             FlowWatcher::Methods(to) => {
                 if let FlowValue::Generic(name) = value {
                     let methods = self.cell(CellKey::Methods(self.symbol(name).clone()));
-                    self.copy(methods, *to);
+                    self.copy(methods, to);
                 }
             }
-            FlowWatcher::Lock(spot) => self.lock(*spot, value),
+            FlowWatcher::Lock(spot) => self.lock(spot, value),
         }
     }
 }

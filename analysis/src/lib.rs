@@ -15,6 +15,7 @@
 mod advice;
 mod call;
 mod cause;
+mod cells;
 mod clause;
 mod declared;
 mod effect;

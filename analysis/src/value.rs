@@ -48,6 +48,7 @@ macro_rules! number {
 }
 
 number!(/** A cell. */ CellId);
+number!(/** A call of values. */ PointId);
 number!(/** A symbol that is interned here. */ NameId);
 number!(/** An object of the program: all that one place makes in one context. */ ThingId);
 number!(/** A task, or an operation: all that one place begins in one context. */ WorkId);
