@@ -154,8 +154,11 @@ impl Maker<'_, '_> {
                 continue;
             }
             for (_, effect) in &self.flow.running[number].effects {
-                let code: &Code = match effect {
-                    NodeEffect::Call(code) | NodeEffect::Absorb(code) | NodeEffect::Body(_, code) => code,
+                let codes: &[Code] = match effect {
+                    NodeEffect::Call(_) | NodeEffect::CallMany | NodeEffect::Absorb(_) => {
+                        self.flow.called_by(effect)
+                    }
+                    NodeEffect::Body(_, code) => std::slice::from_ref(code),
                     NodeEffect::FailAs(work) | NodeEffect::Start(work) | NodeEffect::FailAll(work) => {
                         let kind = self.flow.works[work.index()].kind;
                         if matches!(kind, TaskKind::Mock | TaskKind::World | TaskKind::Host) {
@@ -165,7 +168,7 @@ impl Maker<'_, '_> {
                     }
                     _ => continue,
                 };
-                pending.extend(self.flow.number_of(*code));
+                pending.extend(codes.iter().filter_map(|code| self.flow.number_of(*code)));
             }
         }
         true

@@ -5,7 +5,7 @@ use esl_compiler::core::{Lambda, NodeId};
 
 use crate::effect::{FailureKind, NodeEffect, Reason, mistake};
 use crate::flow::{CallArguments, CallPoint, FlowWatcher, Passing, ValueFlow};
-use crate::value::{CellId, CellKey, Code, FlowValue, NameId, Spot, TaskKind, ThingKey, WorkKey};
+use crate::value::{CellId, CellKey, Code, FlowValue, NameId, PointId, Spot, TaskKind, ThingKey, WorkKey};
 
 /// Whether a symbol is one of the library.
 pub(crate) fn is_of_library(symbol: &Symbol) -> bool {
@@ -97,7 +97,10 @@ impl ValueFlow<'_> {
     }
 
     /// Calls a value.
-    pub(crate) fn call_value(&mut self, point: &CallPoint, value: FlowValue) {
+    pub(crate) fn call_value(&mut self, id: PointId, point: &CallPoint, value: FlowValue) {
+        if self.calls_among_many(id, point, value) {
+            return;
+        }
         match value {
             FlowValue::Closure(code) => self.call_closure(point, code),
             FlowValue::Function(name) => self.call_by_name(point, name),
@@ -164,7 +167,7 @@ impl ValueFlow<'_> {
     }
 
     /// Has arguments flow to the parameters of a function.
-    fn bind(&mut self, code: Code, lambda: &Lambda, arguments: &CallArguments) {
+    pub(crate) fn bind(&mut self, code: Code, lambda: &Lambda, arguments: &CallArguments) {
         let positional: Vec<_> = lambda
             .required
             .iter()

@@ -48,6 +48,11 @@ impl ValueSet {
         })
     }
 
+    /// Returns the number of values.
+    pub(crate) fn len(&self) -> usize {
+        self.count
+    }
+
     /// Returns those of another set that this one does not have.
     fn lacks(&self, other: &ValueSet) -> ValueSet {
         let mut missing = ValueSet::default();
@@ -116,6 +121,8 @@ pub(crate) struct Cells<W> {
     copies: usize,
     /// Work at which cycles are looked for.
     next_search: usize,
+    /// Whether cycles have been looked for since this was set to false.
+    pub(crate) has_merged: bool,
     /// Work done: values and blocks of values that have been sent.
     pub(crate) sent: usize,
 }
@@ -123,6 +130,7 @@ pub(crate) struct Cells<W> {
 /// Values for watchers.
 #[derive(Debug)]
 pub(crate) struct Sending<W> {
+    pub(crate) cell: CellId,
     pub(crate) values: ValueSet,
     pub(crate) watchers: Vec<W>,
 }
@@ -136,6 +144,7 @@ impl<W: Copy + Eq + std::hash::Hash> Cells<W> {
             queue: VecDeque::new(),
             copies: 0,
             next_search: WORK_BETWEEN_SEARCHES,
+            has_merged: false,
             sent: 0,
         }
     }
@@ -165,6 +174,15 @@ impl<W: Copy + Eq + std::hash::Hash> Cells<W> {
             one = std::mem::replace(&mut self.merged[one.index()], root);
         }
         root
+    }
+
+    /// Returns the values of a cell.
+    pub(crate) fn values(&self, cell: CellId) -> &ValueSet {
+        let mut cell = cell;
+        while self.merged[cell.index()] != cell {
+            cell = self.merged[cell.index()];
+        }
+        &self.cells[cell.index()].values
     }
 
     fn enqueue(&mut self, cell: CellId) {
@@ -225,14 +243,14 @@ impl<W: Copy + Eq + std::hash::Hash> Cells<W> {
         loop {
             if self.sent > self.next_search {
                 self.merge_cycles();
+                self.has_merged = true;
                 self.next_search = self.sent + WORK_BETWEEN_SEARCHES.max(2 * self.copies);
             }
             match self.queue.pop_front()? {
                 Arrival::Watcher(watcher, cell) => {
                     let cell = self.find(cell);
                     let values = self.cells[cell.index()].values.clone();
-                    self.sent += values.count;
-                    return Some(Sending { values, watchers: vec![watcher] });
+                    return Some(Sending { cell, values, watchers: vec![watcher] });
                 }
                 Arrival::Values(cell) => {
                     if self.merged[cell.index()] != cell {
@@ -250,8 +268,7 @@ impl<W: Copy + Eq + std::hash::Hash> Cells<W> {
                         }
                     }
                     if !watchers.is_empty() {
-                        self.sent += values.count * watchers.len();
-                        return Some(Sending { values, watchers });
+                        return Some(Sending { cell, values, watchers });
                     }
                 }
             }

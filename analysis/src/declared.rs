@@ -5,16 +5,16 @@ use std::collections::BTreeMap;
 
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::symbol::Symbol;
-use esl_compiler::core::LambdaId;
+use esl_compiler::core::NodeId;
 use esl_compiler::diagnostic::Sources;
 
 use crate::cause::{Applies, clause_applies, is_above_cause, is_of_mistake};
 use crate::forms::{CoreForms, DeclaredCauses};
 use crate::guard::LeavingFailures;
 use crate::is_of_program;
-use crate::row::{FailingTask, FailureTable};
-use crate::table::{Maker, shown_function};
-use crate::value::{Code, NO_CONTEXT, TaskKind};
+use crate::row::{CodePlace, FailingTask, FailureTable};
+use crate::table::{Maker, shown_function, top_level};
+use crate::value::TaskKind;
 
 /// Beginning of the names of the tasks in which scripts of worlds answer.
 pub(crate) const SCRIPTED: &str = "scripted ";
@@ -103,6 +103,7 @@ impl Maker<'_, '_> {
             let (form, node) = declared.place;
             let span = forms.forms[form].core.nodes[node.index()].span;
             let shown = shown_function(name);
+            let crowded = self.crowded_place(name);
             let mut is_seen = vec![false; declared.causes.len()];
             let mut told = Vec::new();
             for failing in kinds {
@@ -117,7 +118,13 @@ impl Maker<'_, '_> {
                     let message = format!("`{shown}` may fail with {cause}, which it does not declare");
                     let origin = forms.forms[failing.form as usize].core.nodes[failing.node.index()].span;
                     let found = Diagnostic::new("undeclared-failure", Severity::Error, message, span);
-                    findings.push(found.also(origin, "it begins here"));
+                    let found = found.also(origin, "it begins here");
+                    findings.push(match &crowded {
+                        Some(place) => found.help(format!(
+                            "too many functions may be called at {place} to be told apart: the failures of all of them count there"
+                        )),
+                        None => found,
+                    });
                     told.push(cause);
                 }
             }
@@ -185,10 +192,30 @@ impl Maker<'_, '_> {
         findings
     }
 
+    /// Returns a place with too many functions in the code that a function, or the main task, runs.
+    fn crowded_place(&self, name: &Symbol) -> Option<CodePlace> {
+        if self.flow.many.places.is_empty() {
+            return None;
+        }
+        let defined = self.flow.forms.defined.get(name);
+        let codes = match defined.and_then(|(form, node)| Some((*form, self.lambda_defined(*form, *node)?))) {
+            Some((form, lambda)) => {
+                let numbers = self.numbers.get(&(form as u32, lambda)).into_iter().flatten();
+                numbers.map(|number| self.flow.running[*number].code).collect()
+            }
+            None => top_level(self.flow.forms),
+        };
+        let is_crowded = |spot: &(u32, NodeId)| self.flow.many.places.contains(spot);
+        let places = self.reach(codes).into_iter().flat_map(|number| {
+            let running = &self.flow.running[number];
+            running.effects.iter().map(|(node, _)| (running.code.form, *node))
+        });
+        places.filter(is_crowded).min().map(|(form, node)| self.place(form, node))
+    }
+
     fn leaving_main(&self) -> LeavingFailures {
         let mut main = LeavingFailures::default();
-        for form in 0..self.flow.forms.forms.len() {
-            let code = Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT };
+        for code in top_level(self.flow.forms) {
             if let Some(number) = self.flow.number_of(code) {
                 main.add(&self.solution.leaving[number]);
             }

@@ -57,6 +57,8 @@ pub(crate) mod mistake {
 pub(crate) enum NodeEffect {
     /// It calls this code, whose failures leave the call.
     Call(Code),
+    /// It calls each function of [`ManyCalls`](crate::many::ManyCalls).
+    CallMany,
     /// It calls this code, whose failures end there.
     Absorb(Code),
     /// It begins a task or an operation.

@@ -169,6 +169,7 @@ impl Maker<'_, '_> {
             for (node, effect) in &running.effects {
                 let word = match effect {
                     NodeEffect::Call(called) if *called == code => "called",
+                    NodeEffect::CallMany if self.flow.many.codes.contains(&code) => "called, among many,",
                     NodeEffect::Absorb(called) if *called == code => "ends at the call",
                     NodeEffect::FailAs(work) if works.contains(work) => {
                         "the task's failure is that of the form"
@@ -185,7 +186,7 @@ impl Maker<'_, '_> {
                 let place = self.place(running.code.form, *node);
                 let function = self.function_around(running.code.form, running.code.lambda);
                 tree.line(depth, &format!("{word} at {place}, in {function}"));
-                if matches!(effect, NodeEffect::Call(_) | NodeEffect::FailAs(_)) {
+                if matches!(effect, NodeEffect::Call(_) | NodeEffect::CallMany | NodeEffect::FailAs(_)) {
                     self.go_outward(tree, caller, *node, failure, depth + 1);
                 }
             }

@@ -15,6 +15,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::cells::{Cells, Sending};
 use crate::effect::NodeEffect;
 use crate::forms::CoreForms;
+use crate::many::ManyCalls;
+use crate::objects::JoinedObjects;
 use crate::value::{
     CellId, CellKey, Code, ContextId, FlowValue, NO_CONTEXT, NameId, Numbering, PointId, Spot, TaskKind,
     TaskWork, ThingId, ThingKey, WorkId, WorkKey,
@@ -24,9 +26,9 @@ use crate::value::{
 pub(crate) const DEPTH: usize = 3;
 /// Most pieces of code, contexts told apart, until contexts are no longer told apart.
 const MOST_CODE: usize = 20_000;
-/// Most arrivals of values until the analysis is given up: in programs that pass many closures through data,
-/// they grow with the square of the closures, or worse.
-const MOST_ARRIVALS: usize = 4_000_000;
+/// Most work until the analysis is given up, which takes thousands of functions that all call each other as
+/// values: [`ManyCalls`] has the work grow with their number, but not their sets.
+const MOST_ARRIVALS: usize = 20_000_000;
 
 /// A place that looks at the values that arrive in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -43,6 +45,8 @@ pub(crate) enum FlowWatcher {
     Store(CellId),
     /// Functions are called.
     Call(PointId),
+    /// Functions are called at each place with too many functions.
+    CallAmongMany,
     /// Conditions and causes fail at this spot.
     Fail(Spot),
     /// Tasks' failures are failures at this spot.
@@ -110,10 +114,10 @@ pub(crate) struct ValueFlow<'a> {
     pub(crate) forms: &'a CoreForms,
     /// Most calls in a context of this analysis.
     depth: usize,
-    cell_keys: Numbering<CellKey>,
-    cells: Cells<FlowWatcher>,
-    values: Numbering<FlowValue>,
-    points: Numbering<Rc<CallPoint>>,
+    pub(crate) cell_keys: Numbering<CellKey>,
+    pub(crate) cells: Cells<FlowWatcher>,
+    pub(crate) values: Numbering<FlowValue>,
+    pub(crate) points: Numbering<Rc<CallPoint>>,
     pub(crate) names: Numbering<Symbol>,
     pub(crate) things: Numbering<ThingKey>,
     work_keys: Numbering<WorkKey>,
@@ -124,7 +128,11 @@ pub(crate) struct ValueFlow<'a> {
     seen: FxHashSet<(Spot, NodeEffect)>,
     unread: VecDeque<usize>,
     /// Objects whose first elements are told apart from the others.
-    exact: FxHashSet<ThingId>,
+    pub(crate) exact: FxHashSet<ThingId>,
+    /// Objects that are not told apart any more.
+    pub(crate) objects: JoinedObjects,
+    /// Calls at places with too many functions.
+    pub(crate) many: ManyCalls,
     /// Spots that fail with a computed cause.
     pub(crate) computed: Vec<Spot>,
     /// Positions of parameters that a function calls, for functions that have such.
@@ -156,6 +164,8 @@ impl<'a> ValueFlow<'a> {
             seen: FxHashSet::default(),
             unread: VecDeque::new(),
             exact: FxHashSet::default(),
+            objects: JoinedObjects::default(),
+            many: ManyCalls::default(),
             computed: Vec::new(),
             calls_arguments: crate::hot::calling_their_arguments(forms),
             interesting: forms
@@ -232,7 +242,7 @@ impl<'a> ValueFlow<'a> {
 
     /// Adds a value to a cell.
     pub(crate) fn add(&mut self, cell: CellId, value: FlowValue) {
-        let number = self.values.number(&value).0;
+        let number = self.values.number(&self.objects.standing_for(value)).0;
         self.cells.add(cell, number);
     }
 
@@ -321,10 +331,17 @@ impl<'a> ValueFlow<'a> {
                 self.read(code);
                 continue;
             }
-            let Some(Sending { values, watchers }) = self.cells.next() else { return };
+            let Some(Sending { cell, values, watchers }) = self.cells.next() else { return };
+            if std::mem::take(&mut self.cells.has_merged) {
+                self.join_equal_objects();
+            }
+            self.join_objects(cell, &watchers);
+            self.crowd(cell, &watchers);
+            let values = self.values_in(&values);
+            self.cells.sent += values.len() * watchers.len();
             for watcher in watchers {
-                for value in values.iter() {
-                    self.arrive(watcher, self.values.keys[value as usize]);
+                for value in &values {
+                    self.arrive(watcher, *value);
                 }
             }
         }
@@ -371,9 +388,14 @@ impl<'a> ValueFlow<'a> {
                     self.copy(from, first);
                 }
             }
-            FlowWatcher::Call(point) => {
-                let point = self.points.keys[point.index()].clone();
-                self.call_value(&point, value);
+            FlowWatcher::Call(id) => {
+                let point = self.points.keys[id.index()].clone();
+                self.call_value(id, &point, value);
+            }
+            FlowWatcher::CallAmongMany => {
+                if let FlowValue::Closure(code) = value {
+                    self.add_to_many(code);
+                }
             }
             FlowWatcher::Fail(spot) => self.fail_with(spot, value),
             FlowWatcher::FailAs(spot) => {

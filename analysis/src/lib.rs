@@ -28,6 +28,8 @@ mod guard;
 mod handling;
 mod hot;
 mod library;
+mod many;
+mod objects;
 mod orders;
 mod resuming;
 mod rights;

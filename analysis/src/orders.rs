@@ -208,9 +208,10 @@ impl OrderWalk<'_, '_> {
             for effect in effects.get(&node).into_iter().flatten() {
                 match effect {
                     // A limit ends the wait.
-                    NodeEffect::Call(_) | NodeEffect::Absorb(_) if is_limited => {}
-                    NodeEffect::Call(code) | NodeEffect::Absorb(code) => {
-                        self.enter(*code, next.taker, &inside)
+                    NodeEffect::Call(_) | NodeEffect::CallMany | NodeEffect::Absorb(_) => {
+                        let flow = self.flow;
+                        let called = flow.called_by(effect).iter().filter(|_| !is_limited);
+                        called.for_each(|code| self.enter(*code, next.taker, &inside));
                     }
                     NodeEffect::Start(work) if self.flow.works[work.index()].kind == TaskKind::Part => {
                         self.enter_work(*work, &held);

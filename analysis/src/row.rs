@@ -162,6 +162,9 @@ pub struct FailureTable {
     pub declared: BTreeMap<String, Vec<String>>,
     /// Declarations that do not hold, clauses that never apply, and other warnings.
     pub findings: Vec<esl_bytecode::diagnostic::Diagnostic>,
+    /// Places that call too many functions to be told apart, in order: the failures of all functions that are
+    /// called at such places count at each.
+    pub crowded: Vec<CodePlace>,
     /// Whether so many values flow in the program that the search for failures was given up: the table has
     /// none.
     pub is_incomplete: bool,

@@ -34,6 +34,8 @@ pub(crate) struct Solution {
     pub(crate) leaving: Vec<LeavingFailures>,
     /// Failures that leave each clause of a lambda that runs clauses.
     pub(crate) of_clauses: FxHashMap<(usize, usize), LeavingFailures>,
+    /// Failures that leave calls at places with too many functions.
+    of_many: LeavingFailures,
     /// Failures that end each task.
     pub(crate) of_works: Vec<LeavingFailures>,
     /// Whether further failures have been caught, or found in interrupted code, in this round.
@@ -62,6 +64,9 @@ pub(crate) fn solve(flow: &ValueFlow<'_>) -> Solution {
     let bodies = bodies_of_works(flow);
     for _ in 0..MOST_ROUNDS {
         let mut has_changed = false;
+        for number in flow.many.codes.iter().filter_map(|code| flow.number_of(*code)) {
+            solution.of_many.add(&solution.leaving[number]);
+        }
         for number in (0..flow.running.len()).rev() {
             has_changed |= solution.look_at(flow, number);
         }
@@ -205,8 +210,8 @@ impl Solution {
             return;
         }
         for (node, effect) in effects {
-            if let (NodeEffect::Call(called), Some(row)) = (effect, calls.get_mut(node)) {
-                row.push(*called);
+            if let (NodeEffect::Call(_) | NodeEffect::CallMany, Some(row)) = (effect, calls.get_mut(node)) {
+                row.extend(flow.called_by(effect));
             }
         }
         for (node, effect) in effects {
@@ -316,6 +321,7 @@ impl Solution {
                     return self.leaving[number].clone();
                 }
             }
+            NodeEffect::CallMany => return self.of_many.clone(),
             NodeEffect::Absorb(_) | NodeEffect::Start(_) | NodeEffect::Body(..) | NodeEffect::FailAll(_) => {}
             NodeEffect::Limit(work, cause) => {
                 let failure = self.failure(FailureKind::Cause(cause), code.form, node);

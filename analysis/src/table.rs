@@ -11,9 +11,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::cause::{MISTAKES, cause_of_condition};
 use crate::declared::{SCRIPTED, declared};
-use crate::effect::{FailureKind, NodeEffect, Reason};
+use crate::effect::{FailureKind, Reason};
 use crate::flow::ValueFlow;
-use crate::forms::ScopeKind;
+use crate::forms::{CoreForms, ScopeKind};
 use crate::guard::{FailureId, LeavingFailures};
 use crate::row::{CauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow};
 use crate::solve::{Solution, bodies_of_works};
@@ -184,12 +184,19 @@ impl Maker<'_, '_> {
             of_modules: self.of_modules(),
             declared: declared(self.flow.forms),
             findings: self.findings(),
+            crowded: self.crowded(),
             is_incomplete: false,
         };
         table.findings.extend(self.unhandled(&table.tasks));
         table.findings.extend(self.advice());
         table.findings.extend(crate::orders::findings(self.flow));
         table
+    }
+
+    /// Returns the places that call too many functions.
+    fn crowded(&self) -> Vec<CodePlace> {
+        let places = self.flow.many.places.iter().map(|(form, node)| self.place(*form, *node));
+        places.collect::<BTreeSet<CodePlace>>().into_iter().collect()
     }
 
     /// Returns the causes that may leave functions of modules that come with the system.
@@ -257,7 +264,7 @@ impl Maker<'_, '_> {
     }
 
     /// Returns the code that a task runs, calls included.
-    fn reach(&self, codes: Vec<Code>) -> FxHashSet<usize> {
+    pub(crate) fn reach(&self, codes: Vec<Code>) -> FxHashSet<usize> {
         let mut found = FxHashSet::default();
         let mut pending = codes;
         while let Some(code) = pending.pop() {
@@ -266,9 +273,7 @@ impl Maker<'_, '_> {
                 continue;
             }
             for (_, effect) in &self.flow.running[number].effects {
-                if let NodeEffect::Call(called) | NodeEffect::Absorb(called) = effect {
-                    pending.push(*called);
-                }
+                pending.extend(self.flow.called_by(effect));
             }
             let form = &self.flow.forms.forms[code.form as usize];
             for scope in &form.scopes {
@@ -298,9 +303,7 @@ impl Maker<'_, '_> {
             }
             rows.into_iter().collect::<Vec<usize>>()
         };
-        let tops: Vec<Code> = (0..self.flow.forms.forms.len())
-            .map(|form| Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT })
-            .collect();
+        let tops = top_level(self.flow.forms);
         let mut main = LeavingFailures::default();
         for code in &tops {
             if let Some(number) = self.flow.number_of(*code) {
@@ -395,6 +398,12 @@ impl Maker<'_, '_> {
             format!("{word}task")
         }
     }
+}
+
+/// Returns the code of the top-level forms.
+pub(crate) fn top_level(forms: &CoreForms) -> Vec<Code> {
+    let code = |form| Code { form: form as u32, lambda: LambdaId(0), context: NO_CONTEXT };
+    (0..forms.forms.len()).map(code).collect()
 }
 
 /// Whether the name of a lambda tells more than its form.

@@ -128,6 +128,10 @@ pub(crate) enum CellKey {
     Thrown,
     /// Facts.
     Facts,
+    /// Arguments of calls of too many functions.
+    ManyArguments,
+    /// Values of such calls.
+    ManyResults,
 }
 
 /// Origin of a task or an operation.
@@ -187,6 +191,11 @@ impl<K> Default for Numbering<K> {
 }
 
 impl<K: Clone + Eq + std::hash::Hash> Numbering<K> {
+    /// Returns the number of a key, if it has one.
+    pub(crate) fn find(&self, key: &K) -> Option<u32> {
+        self.numbers.get(key).copied()
+    }
+
     /// Returns the number of a key, and whether it is new.
     pub(crate) fn number(&mut self, key: &K) -> (u32, bool) {
         if let Some(number) = self.numbers.get(key) {

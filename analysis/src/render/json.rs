@@ -68,6 +68,7 @@ pub(super) fn render(table: &FailureTable) -> String {
         "functions": functions.collect::<Vec<_>>(),
         "clauses": clauses.collect::<Vec<_>>(),
         "goals": goals.collect::<Vec<_>>(),
+        "too-many-functions": table.crowded.iter().map(place).collect::<Vec<_>>(),
     });
     format!("{all:#}\n")
 }

@@ -5,6 +5,8 @@ use std::fmt::Write;
 use crate::row::{CauseRow, CodePlace, FailingTask, FailureTable};
 use crate::value::TaskKind;
 
+/// Most places with too many functions that are listed.
+const MOST_PLACES: usize = 10;
 /// Most origins that one row shows.
 const MOST_ORIGINS: usize = 4;
 
@@ -91,6 +93,18 @@ pub(super) fn render(table: &FailureTable) -> String {
         .collect();
     if !others.is_empty() {
         _ = writeln!(text, "no failure leaves: {}", others.join(", "));
+    }
+    if !table.crowded.is_empty() {
+        _ = writeln!(
+            text,
+            "too many functions may be called here; at each place count the failures of all of them"
+        );
+        for place in table.crowded.iter().take(MOST_PLACES) {
+            _ = writeln!(text, "  {}", short(place));
+        }
+        if table.crowded.len() > MOST_PLACES {
+            _ = writeln!(text, "  and {} more", table.crowded.len() - MOST_PLACES);
+        }
     }
     text
 }

@@ -1,0 +1,125 @@
+//! Objects that are not told apart any more: too many of them come to one place that looks inside.
+//!
+//! Their contents become one cell. Source: Steensgaard 1996, for those places only.
+
+use std::collections::hash_map::Entry;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::cells::ValueSet;
+use crate::flow::{FlowWatcher, ValueFlow};
+use crate::value::{CellId, CellKey, FlowValue, ThingId};
+
+/// Most objects that are told apart at one place.
+const MOST_OBJECTS: usize = 200;
+
+/// Objects that stand for others.
+#[derive(Debug, Default)]
+pub(crate) struct JoinedObjects {
+    joined: FxHashMap<ThingId, ThingId>,
+}
+
+impl JoinedObjects {
+    /// Returns the object that stands for an object.
+    pub(crate) fn find(&self, thing: ThingId) -> ThingId {
+        let mut thing = thing;
+        while let Some(other) = self.joined.get(&thing) {
+            thing = *other;
+        }
+        thing
+    }
+
+    /// Returns a value, or the object that stands for it.
+    pub(crate) fn standing_for(&self, value: FlowValue) -> FlowValue {
+        match value {
+            FlowValue::Thing(thing) => FlowValue::Thing(self.find(thing)),
+            value => value,
+        }
+    }
+}
+
+impl ValueFlow<'_> {
+    /// Returns the values with these numbers, of which one object may stand for others.
+    pub(crate) fn values_in(&self, numbers: &ValueSet) -> Vec<FlowValue> {
+        let values = numbers.iter().map(|number| self.values.keys[number as usize]);
+        if self.objects.joined.is_empty() {
+            return values.collect();
+        }
+        let mut seen = FxHashSet::default();
+        values.map(|value| self.objects.standing_for(value)).filter(|value| seen.insert(*value)).collect()
+    }
+
+    /// Joins the objects that have become equal: their contents are one cell, and so are their first elements.
+    pub(crate) fn join_equal_objects(&mut self) {
+        let mut by_cells: FxHashMap<(CellId, CellId), ThingId> = FxHashMap::default();
+        for number in 0..self.things.keys.len() as u32 {
+            let thing = ThingId(number);
+            if self.objects.joined.contains_key(&thing) {
+                continue;
+            }
+            let contents = CellKey::Contents(thing);
+            let Some(contents) = self.cell_keys.find(&contents).map(|cell| self.cells.find(CellId(cell)))
+            else {
+                continue;
+            };
+            let first = match self.exact.contains(&thing) {
+                // Where elements are not told apart, each may be the first.
+                false => contents,
+                true => {
+                    let first = self.cell(CellKey::First(thing));
+                    self.cells.find(first)
+                }
+            };
+            match by_cells.entry((contents, first)) {
+                Entry::Vacant(place) => _ = place.insert(thing),
+                Entry::Occupied(place) => self.join_object(*place.get(), thing),
+            }
+        }
+    }
+
+    /// Has an object stand for another one.
+    fn join_object(&mut self, one: ThingId, other: ThingId) {
+        self.objects.joined.insert(other, one);
+        for key in [CellKey::First, CellKey::Contents] {
+            let cells = (self.cell(key(one)), self.cell(key(other)));
+            self.cells.merge(cells.0, cells.1);
+        }
+        let is_exact = self.exact.contains(&one) && self.exact.contains(&other);
+        if !is_exact && self.exact.remove(&one) | self.exact.contains(&other) {
+            let (first, contents) = (self.cell(CellKey::First(one)), self.cell(CellKey::Contents(one)));
+            self.copy(contents, first);
+        }
+    }
+
+    /// Joins the objects in a cell if they are too many for watchers that look inside.
+    pub(crate) fn join_objects(&mut self, cell: CellId, watchers: &[FlowWatcher]) {
+        let looks_inside = |watcher: &FlowWatcher| {
+            matches!(
+                watcher,
+                FlowWatcher::Contents(_)
+                    | FlowWatcher::First(_)
+                    | FlowWatcher::Parts
+                    | FlowWatcher::AllContents(_)
+                    | FlowWatcher::Store(_)
+            )
+        };
+        if self.cells.values(cell).len() <= MOST_OBJECTS || !watchers.iter().any(looks_inside) {
+            return;
+        }
+        let values = self.values_in(self.cells.values(cell));
+        let things = values.iter().filter_map(|value| match value {
+            FlowValue::Thing(thing) => Some(*thing),
+            _ => None,
+        });
+        let things: FxHashSet<ThingId> = things.collect();
+        if things.len() <= MOST_OBJECTS {
+            return;
+        }
+        let mut things: Vec<ThingId> = things.into_iter().collect();
+        things.sort_unstable();
+        let one = things[0];
+        for other in things.drain(1..) {
+            self.join_object(one, other);
+        }
+    }
+}
