@@ -37,6 +37,7 @@ const CALLING: &[&str] = &[
     "KEY",
     "SET-MACRO-CHARACTER",
     "SET-DISPATCH-MACRO-CHARACTER",
+    "HASH-FUNCTION",
 ];
 
 /// Returns whether a program calls functions that are values, so that a symbol in its data may name one.
@@ -56,6 +57,7 @@ fn calls_found_functions(module: &Module) -> bool {
                 Instr::CallBuiltin { builtin, .. } | Instr::TailCallBuiltin { builtin, .. } => {
                     Builtin::from_number(builtin.0).is_some_and(|builtin| is_calling(&builtin.symbol()))
                 }
+                Instr::PushHandlers { .. } => true,
                 instr => instr.call().is_some_and(|call| call.callee.is_in_window()),
             })
         })

@@ -346,6 +346,7 @@ mod tests {
             ("(defclass tank () ((level :accessor level)))", &[Slot]),
             ("(defvar *s* (make-string-output-stream)) (write-string \"a\" *s*)", &[Stream]),
             ("(print (with-output-to-string (s) (princ 1 s)))", &[Stream]),
+            ("(handler-bind ((error (second '(on open)))) (print 1))", &[Stream]),
             ("(print (list (format nil \"a\") (random 3) (gensym)))", &[]),
             ("(spawn (print 1)) (setf (get 'robot 'state) 1)", &[Property]),
             ("(defvar *h* (make-hash-table)) (setf (gethash 1 *h*) 2)", &[Table]),
