@@ -295,6 +295,14 @@ impl Translator<'_, '_> {
         self.set_double(window, root);
     }
 
+    /// Has the machine call the builtin of this instruction. Returns its first value.
+    pub(crate) fn value_of_builtin(&mut self, window: u8) -> Ssa {
+        let outcome = self.call_helper(offset_of!(NativeContext, call_builtin));
+        let signal = self.signal();
+        self.refuse(outcome, signal);
+        self.load(self.base, i32::from(window) * WORD)
+    }
+
     pub(crate) fn call_builtin(&mut self, window: u8, want: Want) {
         self.spill();
         self.tick();

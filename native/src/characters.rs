@@ -1,13 +1,11 @@
 //! Builtins of one character: in line for the characters of ASCII, whose values are in a table.
 
-use std::mem::offset_of;
 use std::sync::LazyLock;
 
 use cranelift_codegen::ir::{InstBuilder, types};
 use esl_bytecode::builtin::Builtin;
 use esl_heap::{Value, character};
 
-use crate::abi::NativeContext;
 use crate::emit::{WORD, memory};
 use crate::kinds::Known;
 use crate::translate::Translator;
@@ -71,10 +69,7 @@ impl Translator<'_, '_> {
         self.jump_with(done, found);
 
         self.go_to(slow);
-        let outcome = self.call_helper(offset_of!(NativeContext, call_builtin));
-        let signal = self.signal();
-        self.refuse(outcome, signal);
-        let found = self.load(self.base, i32::from(window) * WORD);
+        let found = self.value_of_builtin(window);
         self.jump_with(done, found);
         self.go_to(done);
         self.set(window, value, Known::Nothing);

@@ -136,10 +136,7 @@ impl Translator<'_, '_> {
         self.jump_with(done, found);
 
         self.go_to(more);
-        let outcome = self.call_helper(offset_of!(NativeContext, call_builtin));
-        let signal = self.signal();
-        self.refuse(outcome, signal);
-        let found = self.load(self.base, i32::from(window) * WORD);
+        let found = self.value_of_builtin(window);
         self.jump_with(done, found);
         self.go_to(done);
         value

@@ -10,7 +10,6 @@ use esl_heap::Value;
 use esl_heap::heap::Kind;
 use esl_heap::heap::layout::{Array, Header};
 
-use crate::abi::NativeContext;
 use crate::emit::{ELEMENTS, WORD, in_object, memory};
 use crate::kinds::Known;
 use crate::translate::Translator;
@@ -54,10 +53,7 @@ impl Translator<'_, '_> {
         self.jump_with(done, found);
 
         self.go_to(slow);
-        let outcome = self.call_helper(offset_of!(NativeContext, call_builtin));
-        let signal = self.signal();
-        self.refuse(outcome, signal);
-        let found = self.load(self.base, i32::from(window) * WORD);
+        let found = self.value_of_builtin(window);
         self.jump_with(done, found);
         self.go_to(done);
         self.set(window, value, Known::Nothing);
