@@ -30,8 +30,8 @@ pub struct NewAgent<'a> {
     pub arguments: &'a [String],
     /// Its settings.
     pub setup: &'a RunSetup,
-    /// Where the program is read again if the agent has to begin anew, with its facts, in another version of
-    /// the machine; without it, that is not possible.
+    /// Source of the program, to read again if the agent has to begin anew, with its facts, in another
+    /// version of the machine; without it, that is not possible.
     pub origin: Option<&'a AgentOrigin>,
 }
 

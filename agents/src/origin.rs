@@ -1,4 +1,4 @@
-//! Where the program of an agent comes from: a host with another version of the machine reads it there again.
+//! Source of an agent's program, which a host with another version of the machine reads again.
 
 use std::fs;
 use std::path::{Path, PathBuf};

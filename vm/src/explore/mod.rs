@@ -428,7 +428,7 @@ fn search_by<T: PartialEq + Clone, E>(
     let stuck = ends.iter().position(|ends| !ends);
     let endless = stuck.map(|state| search.choices_to_state(state as u32));
     let (states, has_cycle) = (search.states.len(), search.has_cycle());
-    // Where tasks are exchanged, a way back to a state need not be one for each of them.
+    // If tasks were exchanged, a way back to a state need not be one for each of them.
     let is_judged = has_cycle && !settings.symmetry;
     let livelock = if is_judged { search.livelock(settings, &ends) } else { None };
     let unmet = if is_judged { search.unmet(settings) } else { Vec::new() };
