@@ -279,8 +279,11 @@ fn accessor_info(vm: &Vm, object: Value) -> Option<Accessor> {
         slot: u16::try_from(slot.car.as_index()?).ok()?,
         access: match slot.cdr {
             Value::NIL => SlotAccess::Free,
-            access if access.is_cons() => SlotAccess::Checked,
-            _ => SlotAccess::ReadOnly,
+            // The type of its values, and whether it is read-only.
+            access => match vm.heap.as_cons(access).and_then(|typed| vm.heap.as_cons(typed.cdr)) {
+                Some(is_read_only) if is_read_only.car == Value::NIL => SlotAccess::Checked,
+                _ => SlotAccess::ReadOnly,
+            },
         },
     })
 }

@@ -133,11 +133,24 @@ fn structures_outlive_the_version_by_their_slots() {
         (Some(3), format!("{}\n(((?W . {})))", wheel(2), wheel(3))),
         "{errors}"
     );
+    // The same slots, one of them of another type.
+    let typed = "(defstruct axle (wheels #() :type vector))
+(defstruct wheel (radius \"\" :type string) parts)
+(define-upgrade (wheel) (old) (make-wheel :radius (princ-to-string (wheel-radius old))))
+(defdurable *axle* nil)
+(print (svref (axle-wheels *axle*) 1))
+(exit 3)";
+    let (status, output, errors) = begin_with(typed);
+    assert_eq!((status, output.trim()), (Some(3), "#S(WHEEL :RADIUS \"2\" :PARTS NIL)"), "{errors}");
     for (definitions, reason) in [
         ("(defstruct axle wheels)", "has a structure WHEEL, which is not defined here"),
         (
             "(defstruct axle wheels) (defstruct wheel radius)",
-            "has a structure WHEEL with other slots, (RADIUS PARTS)",
+            "has a structure WHEEL with other slots or types, (RADIUS PARTS)",
+        ),
+        (
+            "(defstruct axle wheels) (defstruct wheel (radius \"\" :type string) parts)",
+            "has a structure WHEEL with other slots or types, (RADIUS PARTS)",
         ),
     ] {
         let (status, _, errors) = begin_with(&format!("{definitions} (defdurable *axle* nil) (exit 3)"));
