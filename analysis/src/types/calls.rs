@@ -8,6 +8,7 @@ use esl_compiler::core::{Callee, Lambda, NodeId, NodeKind};
 use super::library;
 use super::program::FunctionKey;
 use super::set::{KnownFacts, TypeSet, VariableFact};
+use super::slots;
 use super::walk::TypeWalk;
 
 /// Functions of the library that expect their function argument to fail.
@@ -23,6 +24,11 @@ pub(super) struct ArgumentNeed {
 }
 
 impl ArgumentNeed {
+    /// Returns the need for these values.
+    pub(super) fn of_types(types: TypeSet) -> ArgumentNeed {
+        ArgumentNeed { types, kind: None, parameter: None }
+    }
+
     fn of_kind(kind: ArgumentKind) -> ArgumentNeed {
         ArgumentNeed { types: TypeSet::of(kind.values()), kind: Some(kind), parameter: None }
     }
@@ -73,7 +79,11 @@ impl TypeWalk<'_> {
             Callee::Builtin(builtin) => self.call_builtin(node, *builtin, arguments, types, known),
             Callee::Global(symbol) => {
                 if !spreads {
-                    self.check_message(symbol, arguments);
+                    self.check_message(symbol, arguments, types, known);
+                }
+                if slots::is_refusal(symbol) {
+                    known.leave();
+                    return TypeSet::NONE;
                 }
                 match self.definitions.functions.get(symbol) {
                     Some(key) => self.call_function(node, symbol, *key, (arguments, types), spreads, known),
@@ -159,8 +169,15 @@ impl TypeWalk<'_> {
         let keys: Vec<&str> = keywords.collect();
         for (place, index) in self.parameters_of(positional, &keys, arguments) {
             let Some(fact) = summary.parameters.get(index).copied() else { continue };
-            let variable = parameter_variable(text, index).map(|variable| &core.variables[variable.index()]);
-            let parameter = variable.map(|variable| (variable.name.clone(), fact));
+            let key = index.checked_sub(positional).and_then(|index| text.keys.iter().flatten().nth(index));
+            let name = match key {
+                Some(key) => Some(key.key.clone()),
+                None => {
+                    let variable = parameter_variable(text, index);
+                    variable.map(|variable| core.variables[variable.index()].name.clone())
+                }
+            };
+            let parameter = name.map(|name| (name, fact));
             let need = ArgumentNeed { types: fact.types, kind: None, parameter };
             succeeds &= self.check_argument(node, &shown, arguments[place], types[place], &need, known);
         }
@@ -183,7 +200,7 @@ impl TypeWalk<'_> {
         let needs: Vec<ValueType> = library.positional.iter().chain(of_keys).copied().collect();
         let mut succeeds = true;
         for (place, index) in self.parameters_of(library.positional.len(), &keys, arguments) {
-            let need = ArgumentNeed { types: TypeSet::of(needs[index]), kind: None, parameter: None };
+            let need = ArgumentNeed::of_types(TypeSet::of(needs[index]));
             succeeds &=
                 self.check_argument(node, symbol.name(), arguments[place], types[place], &need, known);
         }
@@ -213,18 +230,18 @@ impl TypeWalk<'_> {
     pub(super) fn slot(
         &mut self,
         node: NodeId,
-        class: &Symbol,
+        (class, number): (&Symbol, u16),
         instance: NodeId,
         known: &mut KnownFacts,
     ) -> TypeSet {
         let types = self.node(instance, known);
         if known.is_reached {
             let below = self.definitions.classes_below(class);
-            let need = ArgumentNeed { types: TypeSet::instances(below), kind: None, parameter: None };
+            let need = ArgumentNeed::of_types(TypeSet::instances(below));
             let name = format!("a slot of {}", class.name().to_lowercase());
             self.check_argument(node, &name, instance, types, &need, known);
         }
-        TypeSet::ANY
+        if self.definitions.substitutes { TypeSet::ANY } else { self.definitions.slot(class, number) }
     }
 
     /// Compares an argument with the need of its function: warns if the call cannot succeed, and otherwise

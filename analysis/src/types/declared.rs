@@ -3,9 +3,11 @@
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::kind::ValueType;
+use esl_bytecode::symbol::{CL_PACKAGE, Symbol};
 use esl_compiler::core::NodeKind;
 use esl_compiler::diagnostic::Sources;
 
+use super::program::ProgramDefinitions;
 use super::set::TypeSet;
 use super::walk::TypeWalk;
 use crate::forms::is_esl;
@@ -14,7 +16,7 @@ use crate::forms::is_esl;
 const MOST_PARTS: usize = 100;
 
 /// Returns the values of a type specifier, and perhaps more.
-pub(super) fn type_of(specifier: &Datum) -> TypeSet {
+pub(super) fn type_of(specifier: &Datum, definitions: &ProgramDefinitions) -> TypeSet {
     let mut all = TypeSet::NONE;
     let mut pending = vec![specifier];
     let mut parts = 0;
@@ -24,27 +26,37 @@ pub(super) fn type_of(specifier: &Datum) -> TypeSet {
             return TypeSet::ANY;
         }
         let items = part.as_list().unwrap_or_default();
-        let named = if part.is_nil() { Some("NIL") } else { part.as_symbol().map(|name| name.name()) };
-        let head = items.first().and_then(|head| head.as_symbol()).map(|name| name.name());
-        match (named, head) {
-            (Some(name), _) => all = all.or(type_named(name)),
-            (None, Some("OR")) => pending.extend(items[1..].iter().copied()),
-            (None, Some("MEMBER" | "EQL")) => {
+        if let Some(name) = part.as_symbol() {
+            all = all.or(type_named(name, definitions));
+            continue;
+        }
+        if part.is_nil() {
+            continue;
+        }
+        let head = items.first().and_then(|head| head.as_symbol());
+        match head.map(|head| (head, head.name())) {
+            Some((_, "OR")) => pending.extend(items[1..].iter().copied()),
+            Some((_, "MEMBER" | "EQL")) => {
                 items[1..]
                     .iter()
                     .for_each(|item| all = all.or(TypeSet::of(ValueType::of_datum(item.kind()))));
             }
-            (None, Some("VALUES")) => pending.extend(items.get(1)),
-            (None, Some("AND" | "NOT" | "SATISFIES") | None) => return TypeSet::ANY,
-            (None, Some(name)) => all = all.or(type_named(name)),
+            Some((_, "VALUES")) => pending.extend(items.get(1)),
+            Some((_, "AND" | "NOT" | "SATISFIES")) | None => return TypeSet::ANY,
+            Some((name, _)) => all = all.or(type_named(name, definitions)),
         }
     }
     all
 }
 
-fn type_named(name: &str) -> TypeSet {
-    TypeSet::of(match name {
-        "NIL" => ValueType::NONE,
+fn type_named(name: &Symbol, definitions: &ProgramDefinitions) -> TypeSet {
+    if !name.is_in(CL_PACKAGE) {
+        return match definitions.is_structure(name) {
+            true => TypeSet::instances(definitions.classes_below(name)),
+            false => TypeSet::ANY,
+        };
+    }
+    TypeSet::of(match name.name() {
         "NULL" => ValueType::NIL,
         "BOOLEAN" | "SYMBOL" => ValueType::SYMBOL,
         "KEYWORD" => ValueType::OTHER_SYMBOL,
@@ -104,7 +116,7 @@ pub(super) fn findings(walk: &TypeWalk<'_>, sources: &Sources) -> Vec<Diagnostic
                 if matches!(parameter.kind(), DatumKind::Symbol(symbol) if symbol.name().starts_with('&')) {
                     break;
                 }
-                let (types, fact) = (type_of(parameter), summary.parameters[index]);
+                let (types, fact) = (type_of(parameter, walk.definitions), summary.parameters[index]);
                 if types.and(fact.types).is_empty() {
                     let (declared, needed) = (walk.noun(types), walk.noun(fact.types));
                     let message = format!(
@@ -115,7 +127,7 @@ pub(super) fn findings(walk: &TypeWalk<'_>, sources: &Sources) -> Vec<Diagnostic
                 }
             }
             if let [result] = results {
-                let types = type_of(result);
+                let types = type_of(result, walk.definitions);
                 // Whether a function never returns, as `nil` says, is not known of each.
                 if !types.is_empty() && types.and(summary.result).is_empty() {
                     let (declared, given) = (walk.noun(types), walk.noun(summary.result));

@@ -1,12 +1,16 @@
 //! Warnings about calls that cannot succeed.
 
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::kind::ValueType;
 use esl_bytecode::span::Span;
 use esl_compiler::core::{NodeId, NodeKind};
 
 use super::calls::ArgumentNeed;
 use super::set::TypeSet;
 use super::walk::TypeWalk;
+
+/// Name of a refusal by a slot, in place of that of a function.
+pub(super) const REFUSED: &str = "a slot";
 
 impl TypeWalk<'_> {
     /// Warns of an argument that its function cannot take.
@@ -35,6 +39,7 @@ impl TypeWalk<'_> {
                 let parameter = parameter.name().to_lowercase();
                 format!("`{name}` needs {needed} as `{parameter}`, and gets {passed}")
             }
+            None if name == REFUSED => format!("this slot takes {needed}, and gets {passed}"),
             None if name.starts_with("a slot") => format!("{name} belongs to {needed}, and not to {passed}"),
             None => format!("`{name}` needs {needed}, and gets {passed}"),
         };
@@ -42,7 +47,9 @@ impl TypeWalk<'_> {
         let call = form.core.nodes[node.index()].span;
         let at = if span == Span::default() { call } else { span };
         let mut found = Diagnostic::new("wrong-type", Severity::Warning, message, at);
-        found = found.label(format!("this is {passed}"));
+        let is_slot = matches!(kind, NodeKind::Local(_)) && name == REFUSED;
+        found =
+            found.label(if is_slot { "the slot is set here".into() } else { format!("this is {passed}") });
         if let NodeKind::Local(variable) = kind {
             let bound = form.core.variables[variable.index()].span;
             if bound != Span::default() && bound != at {
@@ -62,9 +69,11 @@ impl TypeWalk<'_> {
     /// Returns a type as messages name it.
     pub(super) fn noun(&self, types: TypeSet) -> String {
         let names = self.definitions.names(types.classes);
-        if types.values == esl_bytecode::kind::ValueType::INSTANCE && !names.is_empty() {
-            return format!("an instance of {}", names.join(" or "));
+        if names.is_empty() || !types.values.contains(ValueType::INSTANCE) {
+            return types.values.noun();
         }
-        types.values.noun()
+        let instance = format!("an instance of {}", names.join(" or "));
+        let others = types.values.without(ValueType::INSTANCE);
+        if others.is_empty() { instance } else { format!("{} or {instance}", others.noun()) }
     }
 }

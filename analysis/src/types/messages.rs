@@ -1,4 +1,5 @@
-//! Fields of messages: keywords in calls of the module `ros` that the type of the message does not have.
+//! Fields of messages: keywords in calls of the module `ros` that the type of the message does not have, and
+//! values that are not of the types of their fields.
 //!
 //! A type is known where a constant text names it: in the call itself, or in that which has made the
 //! publisher, the input or the message. Types that the analysis cannot find, or that the program defines,
@@ -9,11 +10,13 @@ use std::sync::OnceLock;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::kind::ValueType;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::{BoundVariable, Callee, NodeId, NodeKind, VarId};
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::set::{KnownFacts, TypeSet};
 use super::walk::TypeWalk;
 use crate::forms::{CoreForm, CoreForms};
 
@@ -26,6 +29,19 @@ pub struct KnownField {
     pub part: Option<String>,
     /// Whether it is an array.
     pub is_array: bool,
+    /// The values that a program may give for it, and perhaps more.
+    pub values: ValueType,
+}
+
+/// A mistake about a field.
+struct FieldFault {
+    span: Span,
+    /// The type of messages.
+    of: String,
+    /// The keyword of the field.
+    keyword: String,
+    /// The values that the field takes, and those that it is given, if there is such a field.
+    values: Option<(ValueType, ValueType)>,
 }
 
 /// Finds the fields of a type of messages by its name.
@@ -251,8 +267,15 @@ fn note_parameter(
 }
 
 impl TypeWalk<'_> {
-    /// Compares the fields in a call of the module with the type of their message.
-    pub(super) fn check_message(&mut self, symbol: &Symbol, arguments: &[NodeId]) {
+    /// Compares the fields in a call of the module, and their values, whose types are `types`, with the type
+    /// of their message.
+    pub(super) fn check_message(
+        &mut self,
+        symbol: &Symbol,
+        arguments: &[NodeId],
+        types: &[TypeSet],
+        known: &KnownFacts,
+    ) {
         if self.found.is_none() || self.guards + self.message_guards > 0 || !is_of_module(symbol) {
             return;
         }
@@ -260,22 +283,24 @@ impl TypeWalk<'_> {
         let (form, at) = (self.core_form(), self.at);
         let part_of = |part: &str| text(form, arguments, 2).map(|name| format!("{name}{part}"));
         let checked = match symbol.name() {
-            "MESSAGE" => text(form, arguments, 0).map(|name| (name.to_owned(), arguments.get(1..))),
-            "CALL-SERVICE" => part_of("_Request").map(|name| (name, arguments.get(3..))),
+            "MESSAGE" => text(form, arguments, 0).map(|name| (name.to_owned(), 1..arguments.len())),
+            "CALL-SERVICE" => part_of("_Request").map(|name| (name, 3..arguments.len())),
             "PUBLISH" => arguments
                 .first()
                 .and_then(|publisher| messages.type_of_maker(self.forms, at, *publisher, "ADVERTISE"))
-                .map(|name| (name, arguments.get(1..))),
+                .map(|name| (name, 1..arguments.len())),
             "DO-ACTION" => {
                 let is_goal = |node: &NodeId| form.symbol(*node).is_some_and(|key| key.name() == "GOAL");
                 let goal = arguments.iter().skip(3).step_by(2).position(is_goal).map(|index| 4 + 2 * index);
-                part_of("_Goal").zip(goal).map(|(name, goal)| (name, arguments.get(goal..=goal)))
+                part_of("_Goal").zip(goal).map(|(name, goal)| (name, goal..goal + 1))
             }
             _ => None,
         };
         let mut faults = Vec::new();
-        if let Some((name, Some(fields))) = checked {
-            self.note_faults(&messages, &name, fields, &mut faults);
+        if let Some((name, fields)) = checked
+            && let Some((fields, types)) = arguments.get(fields.clone()).zip(types.get(fields))
+        {
+            self.note_faults(&messages, &name, (fields, types), known, &mut faults);
         }
         if symbol.name() == "FIELD"
             && let Some(whole) = arguments.first()
@@ -283,91 +308,124 @@ impl TypeWalk<'_> {
             && let Err((step, of)) = messages.part(form, name, &arguments[1..])
         {
             let keyword = form.symbol(step).map(|symbol| symbol.name().to_owned()).unwrap_or_default();
-            faults.push((form.core.nodes[step.index()].span, of, keyword));
+            let span = form.core.nodes[step.index()].span;
+            faults.push(FieldFault { span, of, keyword, values: None });
         }
-        for (span, of, keyword) in faults {
-            self.warn_of_field(&messages, span, &of, &keyword);
+        for fault in &faults {
+            self.warn_of_field(&messages, fault);
         }
         self.messages = Some(messages);
     }
 
-    /// Notes keywords that a type has no fields for: the place, the type and the keyword of each.
+    /// Returns the type of an item of a list that has been walked.
+    fn type_of_item(&self, node: NodeId, known: &KnownFacts) -> TypeSet {
+        match self.core_form().kind(node) {
+            NodeKind::Constant(datum) => TypeSet::of(ValueType::of_datum(datum.kind())),
+            NodeKind::Local(variable) => self.variable(*variable, known).types,
+            _ => TypeSet::ANY,
+        }
+    }
+
+    /// Notes keywords that a type has no fields for, and values that fields do not take.
     fn note_faults(
         &self,
         messages: &MessageTypes,
         of: &str,
-        fields: &[NodeId],
-        faults: &mut Vec<(Span, String, String)>,
+        (fields, types): (&[NodeId], &[TypeSet]),
+        known: &KnownFacts,
+        faults: &mut Vec<FieldFault>,
     ) {
         let form = self.core_form();
+        let span = |node: NodeId| form.core.nodes[node.index()].span;
         if let [whole] = fields {
             match form.kind(*whole) {
-                NodeKind::Constant(datum) => {
-                    note_faults_in(messages, of, datum, form.core.nodes[whole.index()].span, faults);
-                }
+                NodeKind::Constant(datum) => note_faults_in(messages, of, datum, span(*whole), faults),
                 NodeKind::Call(Callee::Builtin(Builtin::List), items) if items.len() > 1 => {
-                    self.note_faults(messages, of, items, faults);
+                    let types: Vec<TypeSet> =
+                        items.iter().map(|item| self.type_of_item(*item, known)).collect();
+                    self.note_faults(messages, of, (items, &types), known, faults);
                 }
                 _ => {}
             }
             return;
         }
-        let Some(known) = messages.fields(of) else { return };
-        for pair in fields.chunks(2) {
+        let Some(all) = messages.fields(of) else { return };
+        for (pair, types) in fields.chunks(2).zip(types.chunks(2)) {
             let Some(keyword) = form.symbol(pair[0]).filter(|symbol| symbol.is_keyword()) else { return };
-            match known.iter().find(|field| field.keyword == keyword.name()) {
-                None => {
-                    let span = form.core.nodes[pair[0].index()].span;
-                    faults.push((span, of.to_owned(), keyword.name().to_owned()));
+            let mut fault = |span, values| {
+                faults.push(FieldFault { span, of: of.into(), keyword: keyword.name().into(), values });
+            };
+            match (all.iter().find(|field| field.keyword == keyword.name()), pair.get(1)) {
+                (None, _) => fault(span(pair[0]), None),
+                (Some(field), Some(value)) if !may_be(types[1], field.values) => {
+                    fault(span(*value), Some((field.values, types[1].values)));
                 }
-                Some(KnownField { part: Some(part), is_array: false, .. }) if pair.len() == 2 => {
-                    self.note_faults(messages, part, &pair[1..], faults);
+                (Some(KnownField { part: Some(part), is_array: false, .. }), Some(_)) => {
+                    self.note_faults(messages, part, (&pair[1..], &types[1..]), known, faults);
                 }
-                Some(_) => {}
+                _ => {}
             }
         }
     }
 
-    fn warn_of_field(&mut self, messages: &MessageTypes, span: Span, of: &str, keyword: &str) {
+    fn warn_of_field(&mut self, messages: &MessageTypes, fault: &FieldFault) {
+        let FieldFault { span, of, keyword, values } = fault;
         let shown = |keyword: &str| format!("`:{}`", keyword.to_lowercase());
-        let fields = messages.fields(of).unwrap_or_default();
-        let mut names: Vec<String> = fields.iter().map(|field| shown(&field.keyword)).collect();
-        if names.len() > NAMED {
-            names.truncate(NAMED);
-            names.push("…".into());
-        }
-        let message = format!("`{of}` has no field {}", shown(keyword));
-        let mut found = Diagnostic::new("unknown-keyword", Severity::Warning, message, span);
-        if !names.is_empty() {
-            found = found.help(format!("its fields are {}", names.join(", ")));
-        }
+        let found = match values {
+            Some((needed, given)) => {
+                let (needed, given) = (needed.noun(), given.noun());
+                let message =
+                    format!("the field {} of `{of}` takes {needed}, and gets {given}", shown(keyword));
+                Diagnostic::new("wrong-type", Severity::Warning, message, *span)
+                    .label(format!("this is {given}"))
+            }
+            None => {
+                let message = format!("`{of}` has no field {}", shown(keyword));
+                let found = Diagnostic::new("unknown-keyword", Severity::Warning, message, *span);
+                let fields = messages.fields(of).unwrap_or_default();
+                let mut names: Vec<String> = fields.iter().map(|field| shown(&field.keyword)).collect();
+                if names.len() > NAMED {
+                    names.truncate(NAMED);
+                    names.push("…".into());
+                }
+                match names.is_empty() {
+                    true => found,
+                    false => found.help(format!("its fields are {}", names.join(", "))),
+                }
+            }
+        };
         if let Some(all) = &mut self.found {
             all.push(found);
         }
     }
 }
 
+/// Returns whether a value may be one of those.
+fn may_be(types: TypeSet, values: ValueType) -> bool {
+    types.is_empty() || !types.values.and(values).is_empty()
+}
+
 /// As [`TypeWalk::note_faults`], in a constant list at `span`.
-fn note_faults_in(
-    messages: &MessageTypes,
-    of: &str,
-    list: &Datum,
-    span: Span,
-    faults: &mut Vec<(Span, String, String)>,
-) {
+fn note_faults_in(messages: &MessageTypes, of: &str, list: &Datum, span: Span, faults: &mut Vec<FieldFault>) {
     let (Some(known), Some(items)) = (messages.fields(of), list.as_list()) else { return };
     for pair in items.chunks(2) {
         let Some(keyword) = pair[0].as_symbol().filter(|symbol| symbol.is_keyword()) else { return };
-        match known.iter().find(|field| field.keyword == keyword.name()) {
-            None => {
-                let own = pair[0].span();
-                let at = if own == Span::default() { span } else { own };
-                faults.push((at, of.to_owned(), keyword.name().to_owned()));
+        let mut fault = |datum: &Datum, values| {
+            let own = datum.span();
+            let span = if own == Span::default() { span } else { own };
+            faults.push(FieldFault { span, of: of.into(), keyword: keyword.name().into(), values });
+        };
+        match (known.iter().find(|field| field.keyword == keyword.name()), pair.get(1)) {
+            (None, _) => fault(pair[0], None),
+            (Some(field), Some(value)) => {
+                let given = ValueType::of_datum(value.kind());
+                match &field.part {
+                    _ if given.and(field.values).is_empty() => fault(value, Some((field.values, given))),
+                    Some(part) if !field.is_array => note_faults_in(messages, part, value, span, faults),
+                    _ => {}
+                }
             }
-            Some(KnownField { part: Some(part), is_array: false, .. }) if pair.len() == 2 => {
-                note_faults_in(messages, part, pair[1], span, faults);
-            }
-            Some(_) => {}
+            _ => {}
         }
     }
 }

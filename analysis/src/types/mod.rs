@@ -24,6 +24,7 @@ mod messages;
 mod program;
 mod refine;
 mod set;
+mod slots;
 mod walk;
 
 use esl_bytecode::diagnostic::Diagnostic;

@@ -8,6 +8,9 @@ use esl_compiler::core::{Callee, Core, LambdaId, NodeId, NodeKind};
 use esl_compiler::lambda_nodes;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::declared::type_of;
+use super::set::TypeSet;
+use super::slots::{self, SlotKey};
 use crate::cause::may_be_mistake;
 use crate::clause::can_end;
 use crate::forms::{CoreForms, ScopeKind, function_name, symbols_inside};
@@ -34,6 +37,8 @@ pub(super) struct ProgramDefinitions {
     pub(super) opaque: Vec<bool>,
     /// Functions that may be others at run time than those of their names.
     pub(super) changed: FxHashSet<Symbol>,
+    /// The declared types of the slots of structures, by structure and number.
+    slots: FxHashMap<SlotKey, TypeSet>,
 }
 
 /// Internal functions that only note something under a name.
@@ -121,8 +126,13 @@ impl ProgramDefinitions {
             substitutes: substitutes(forms),
             opaque,
             changed,
+            slots: FxHashMap::default(),
         };
         definitions.note_classes(forms, made);
+        definitions.slots = slots::declared(forms)
+            .into_iter()
+            .map(|(slot, declared)| (slot, type_of(&declared, &definitions)))
+            .collect();
         definitions
     }
 
@@ -166,6 +176,16 @@ impl ProgramDefinitions {
             .collect();
         names.sort_unstable();
         names.into_iter().map(|name| format!("`{name}`")).collect()
+    }
+
+    /// Returns whether a name is that of a structure with a bit of its own, which no type is called as well.
+    pub(super) fn is_structure(&self, name: &Symbol) -> bool {
+        self.bits.contains_key(name)
+    }
+
+    /// Returns the type of the values of a slot.
+    pub(super) fn slot(&self, class: &Symbol, number: u16) -> TypeSet {
+        self.slots.get(&(class.clone(), number)).copied().unwrap_or(TypeSet::ANY)
     }
 
     /// Returns the classes that a new instance of a structure may be of.

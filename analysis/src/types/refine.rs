@@ -21,6 +21,7 @@ impl TypeWalk<'_> {
         let mut otherwise = known.clone();
         self.assume(test, true, tested, known);
         self.assume(test, false, tested, &mut otherwise);
+        self.check_refusal(known, no, &otherwise);
         let first = self.node(yes, known);
         let second = self.node(no, &mut otherwise);
         known.join(otherwise);

@@ -271,9 +271,9 @@ impl<'p> TypeWalk<'p> {
             }
             NodeKind::Call(callee, arguments) => self.call(node, callee, arguments, false, known),
             NodeKind::Apply(callee, arguments) => self.call(node, callee, arguments, true, known),
-            NodeKind::Slot(class, _, instance) => self.slot(node, class, *instance, known),
-            NodeKind::SetSlot(class, _, instance, value) => {
-                self.slot(node, class, *instance, known);
+            NodeKind::Slot(class, number, instance) => self.slot(node, (class, *number), *instance, known),
+            NodeKind::SetSlot(class, number, instance, value) => {
+                self.slot(node, (class, *number), *instance, known);
                 self.node(*value, known)
             }
             NodeKind::IsInstance(_, value) => {

@@ -146,6 +146,55 @@ fn slots_belong_to_structures() {
 }
 
 #[test]
+fn slots_have_their_declared_types() {
+    let program = "(defstruct axle (width 1 :type number))
+                   (defstruct wheel (radius 1 :type number) (name \"\" :type (or null string) :read-only t)
+                              (axle nil :type (or null axle)) any)";
+    let check_with = |text: &str, expected: &[&str]| check(&format!("{program} {text}"), expected);
+    let check_none_with = |text: &str| check_none(&format!("{program} {text}"));
+    // Read.
+    check_with(
+        "(defun f (w) (length (wheel-radius w)))",
+        &["`length` needs a sequence, and gets a number | (wheel-radius w) | "],
+    );
+    check_with(
+        "(defun f (w) (+ 1 (wheel-name w)))",
+        &["`+` needs a number, and gets a string or `nil` | (wheel-name w) | "],
+    );
+    check_with(
+        "(defun f (w) (+ 1 (wheel-axle w)))",
+        &["`+` needs a number, and gets `nil` or an instance of `axle` | (wheel-axle w) | "],
+    );
+    check_with(
+        "(defun f (w) (let ((axle (wheel-axle w))) (when axle (length axle))))",
+        &["`length` needs a sequence, and gets an instance of `axle` | axle | axle"],
+    );
+    check_none_with("(defun f (w) (length (wheel-name w)) (+ 1 (wheel-any w)) (length (wheel-any w)))");
+    // Given to constructors and assigned.
+    check_with(
+        "(defun f () (make-wheel :radius \"a\"))",
+        &["`make-wheel` needs a number as `radius`, and gets a string | \"a\" | "],
+    );
+    check_with(
+        "(defun f (w) (setf (wheel-radius w) (list 1)))",
+        &["this slot takes a number, and gets a list | (wheel-radius w) | "],
+    );
+    check_none_with(
+        "(defun f (w x) (setf (wheel-radius w) x) (setf (wheel-any w) 'a) (make-wheel :radius x))",
+    );
+    // Old instances, structures that are defined twice, and values in the place of those that are refused.
+    check_none_with("(define-upgrade (wheel) (old) (make-wheel :radius (length (wheel-radius old))))");
+    check_none(
+        "(defstruct a (b 1 :type number)) (defstruct a (b \"\" :type string))
+                (defun f (a) (length (a-b a)))",
+    );
+    check_none_with(
+        "(defun f () (with-recovery-procedures ((:type-error 1)) (make-wheel :radius (read))))
+                     (defun g (w) (length (wheel-radius w)))",
+    );
+}
+
+#[test]
 fn failures_that_a_form_takes_are_meant() {
     check_none("(defun f () (handler-case (+ 1 (list 2)) (type-error () 0)))");
     check_none("(defun f () (ignore-errors (+ 1 (list 2))))");

@@ -202,6 +202,11 @@ impl MessageType {
         })
     }
 
+    /// Returns whether a number of seconds may stand for a message: it is a time or a duration.
+    pub fn is_time(&self) -> bool {
+        self.is_time
+    }
+
     /// Returns the full name, as `std_msgs/msg/String`.
     pub fn name(&self) -> &str {
         &self.name

@@ -165,6 +165,43 @@ const MESSAGES: &str = r#"(require :ros)
 "#;
 
 #[test]
+fn values_of_fields_are_of_their_types() {
+    let text = r#"(require :ros)
+(defun drive (node name)
+  (let ((wheels (ros:advertise node "/cmd_vel" "geometry_msgs/msg/Twist"))
+        (text (concatenate 'string name "!")))
+    (ros:publish wheels :linear '(:x "fast"))
+    (ros:publish wheels :linear (list :x text :y 1))
+    (ros:publish wheels :linear 3)
+    (ros:message "std_msgs/msg/String" :data (length name))
+    (ros:message "std_msgs/msg/Bool" :data 0)
+    (ros:message "std_msgs/msg/UInt8" :data 1.5)
+    (ros:message "sensor_msgs/msg/LaserScan" :ranges "none")
+    ;; Right ones: constants of the type, seconds, lists and vectors, and some of which nothing is known.
+    (ros:message "sensor_msgs/msg/BatteryState" :power-supply-status :power-supply-status-full)
+    (ros:message "std_msgs/msg/Header" :stamp 2.5 :frame-id "map")
+    (ros:message "sensor_msgs/msg/LaserScan" :ranges (list 1 2) :intensities #(1.0))
+    (ros:message "std_msgs/msg/Bool" :data nil)
+    (ros:publish wheels :linear (list :x (first name) :y 1/2))))
+"#;
+    let folder = Folder::with("checking-values", &[("drive.esl", text)]);
+    let (status, errors) = run(&folder, &["check", "drive.esl"]);
+    assert_eq!(status, Some(0), "{errors}");
+    let found: Vec<&str> =
+        errors.lines().filter_map(|line| line.strip_prefix("warning[wrong-type]: ")).collect();
+    let expected = [
+        "the field `:x` of `geometry_msgs/msg/Vector3` takes a real number or a symbol, and gets a string",
+        "the field `:x` of `geometry_msgs/msg/Vector3` takes a real number or a symbol, and gets a string",
+        "the field `:linear` of `geometry_msgs/msg/Twist` takes a list, and gets an integer",
+        "the field `:data` of `std_msgs/msg/String` takes a string or a symbol, and gets an integer",
+        "the field `:data` of `std_msgs/msg/Bool` takes a symbol, and gets an integer",
+        "the field `:data` of `std_msgs/msg/UInt8` takes an integer or a symbol, and gets a float",
+        "the field `:ranges` of `sensor_msgs/msg/LaserScan` takes an array or a list, and gets a string",
+    ];
+    assert_eq!(found, expected, "{errors}");
+}
+
+#[test]
 fn fields_of_messages_are_those_of_their_types() {
     let folder = Folder::with("checking-messages", &[("drive.esl", MESSAGES)]);
     let (status, errors) = run(&folder, &["check", "drive.esl"]);
