@@ -8,7 +8,7 @@ use esl_compiler::children;
 use esl_compiler::core::{BoundVariable, Callee, NodeId, NodeKind};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::cause::{Applies, clause_applies, is_above_cause, is_standard, mistakes_named};
+use crate::cause::{Applies, clause_applies, is_above_cause, is_standard, mistakes_named, shown_cause};
 use crate::clause::{Clause, ClauseLimit};
 use crate::effect::NodeEffect;
 use crate::forms::{CoreForm, ScopeKind};
@@ -77,7 +77,7 @@ impl Maker<'_, '_> {
                 });
                 let only_mistakes = runs.iter().all(|(_, handled)| handled.taken[position].is_empty());
                 let span = self.span_inside(form, clause.body);
-                let cause = clause.cause.to_string().to_lowercase();
+                let cause = shown_cause(&clause.cause);
                 let is_counted = clause.limit != ClauseLimit::Times(0);
                 if !takes
                     && is_counted

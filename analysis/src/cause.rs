@@ -85,9 +85,9 @@ pub(crate) fn may_be_mistake(forms: &CoreForms, cause: &Symbol) -> bool {
     !cause.is_keyword() || is_mistake(cause.name()) || forms.redefines_mistakes
 }
 
-/// Returns whether a cause, as tables show it, is that of conditions of Lisp, such as `:type-error`.
-pub(crate) fn is_of_mistake(cause: &str) -> bool {
-    cause.strip_prefix(':').is_some_and(|name| is_mistake(&name.to_uppercase()))
+/// Returns whether a cause is that of conditions of Lisp, such as `:type-error`.
+pub(crate) fn is_of_mistake(cause: &Symbol) -> bool {
+    cause.is_keyword() && is_mistake(cause.name())
 }
 
 /// Whether a cause or a type with this name is one of the standard.
@@ -106,18 +106,29 @@ pub(crate) fn condition_of(forms: &CoreForms, cause: &Symbol) -> Option<Symbol> 
     parents_of_standard(cause.name()).map(|_| Symbol::cl(cause.name()))
 }
 
+/// Returns a cause as a program has it: in lower case, or between bars if it could not be read otherwise.
+pub fn shown_cause(cause: &Symbol) -> String {
+    let name = cause.name();
+    let is_plain =
+        |c: char| !c.is_lowercase() && !c.is_whitespace() && !c.is_control() && !"\"#'(),;`:|\\".contains(c);
+    if !name.is_empty() && name.chars().all(is_plain) {
+        return cause.to_string().to_lowercase();
+    }
+    let escaped = name.replace('\\', "\\\\").replace('|', "\\|");
+    format!("{}|{escaped}|", if cause.is_keyword() { ":" } else { "" })
+}
+
 /// Returns the cause of conditions of a type.
-pub(crate) fn cause_of_condition(condition: &Symbol) -> String {
+pub(crate) fn cause_of_condition(condition: &Symbol) -> Symbol {
     let name = condition.name();
-    let shown = match name {
+    Symbol::keyword(match name {
         "SIMPLE-PROGRAM-ERROR" => "PROGRAM-ERROR",
         "SIMPLE-CONTROL-ERROR" => "CONTROL-ERROR",
         "SIMPLE-PARSE-ERROR" => "PARSE-ERROR",
         "SIMPLE-STREAM-ERROR" => "STREAM-ERROR",
         "DETAILED-TYPE-ERROR" | "CASE-FAILURE" => "TYPE-ERROR",
         other => other,
-    };
-    format!(":{}", shown.to_lowercase())
+    })
 }
 
 /// Returns the names of a condition type and of all above it.
@@ -299,12 +310,12 @@ pub(crate) fn mistakes_of_type(wanted: &Datum) -> (u8, u8) {
 
 /// Kinds of programming errors, with their causes.
 pub(crate) const MISTAKES: [(u8, &str); 8] = [
-    (mistake::TYPE, ":type-error"),
-    (mistake::ARITHMETIC, ":arithmetic-error"),
-    (mistake::NAME, ":cell-error"),
-    (mistake::PROGRAM, ":program-error"),
-    (mistake::OTHER, ":error"),
-    (mistake::CRITICAL, ":would-block"),
-    (mistake::CONSEQUENCE, ":all-failed"),
-    (mistake::CAUSE, ":error (as a cause)"),
+    (mistake::TYPE, "TYPE-ERROR"),
+    (mistake::ARITHMETIC, "ARITHMETIC-ERROR"),
+    (mistake::NAME, "CELL-ERROR"),
+    (mistake::PROGRAM, "PROGRAM-ERROR"),
+    (mistake::OTHER, "ERROR"),
+    (mistake::CRITICAL, "WOULD-BLOCK"),
+    (mistake::CONSEQUENCE, "ALL-FAILED"),
+    (mistake::CAUSE, "ERROR"),
 ];

@@ -8,7 +8,7 @@ use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::NodeId;
 use esl_compiler::diagnostic::Sources;
 
-use crate::cause::{Applies, clause_applies, is_above_cause, is_of_mistake};
+use crate::cause::{Applies, clause_applies, is_above_cause, is_of_mistake, shown_cause};
 use crate::forms::{CoreForms, DeclaredCauses};
 use crate::guard::LeavingFailures;
 use crate::is_of_program;
@@ -23,24 +23,22 @@ impl FailureTable {
     /// Returns the known causes of failures of functions and operations, such as `:timeout`, by the names of
     /// these in lower case: those that the program shows, those of scripts of worlds, declared ones, and
     /// those of functions of modules. Failures of a module because of wrong arguments are left out.
-    pub fn causes_by_name(&self) -> BTreeMap<String, Vec<String>> {
-        let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
-        let mut add = |name: &str, cause: &str| {
-            // A declared cause stands for those below it, too.
-            let cause = cause.split(' ').next().unwrap_or_default();
+    pub fn causes_by_name(&self) -> BTreeMap<String, Vec<Symbol>> {
+        let mut all: BTreeMap<String, Vec<Symbol>> = BTreeMap::new();
+        let mut add = |name: &str, cause: &Symbol| {
             let causes = all.entry(name.to_string()).or_default();
-            if cause.starts_with(':') && !causes.iter().any(|known| known == cause) {
-                causes.push(cause.to_string());
+            if cause.is_keyword() && !causes.contains(cause) {
+                causes.push(cause.clone());
             }
         };
         for function in &self.functions {
             let causes = function.causes.iter().filter(|row| !row.is_mistake);
-            causes.for_each(|row| add(&function.name, &row.cause));
+            causes.filter_map(|row| row.name.as_ref()).for_each(|cause| add(&function.name, cause));
         }
         for task in &self.tasks {
             if let Some(name) = task.name.strip_prefix(SCRIPTED) {
                 let causes = task.causes.iter().filter(|row| !row.is_mistake);
-                causes.for_each(|row| add(name, &row.cause));
+                causes.filter_map(|row| row.name.as_ref()).for_each(|cause| add(name, cause));
             }
         }
         for (name, causes) in &self.declared {
@@ -55,11 +53,8 @@ impl FailureTable {
 }
 
 /// Returns the declared causes of functions, by their names.
-pub(crate) fn declared(forms: &CoreForms) -> BTreeMap<String, Vec<String>> {
-    let row = |(name, declared): (&Symbol, &DeclaredCauses)| {
-        let causes = declared.causes.iter().map(|cause| cause.to_string().to_lowercase());
-        (shown_function(name), causes.collect())
-    };
+pub(crate) fn declared(forms: &CoreForms) -> BTreeMap<String, Vec<Symbol>> {
+    let row = |(name, declared): (&Symbol, &DeclaredCauses)| (shown_function(name), declared.causes.clone());
     forms.declared.iter().map(row).collect()
 }
 
@@ -129,7 +124,7 @@ impl Maker<'_, '_> {
                 }
             }
             for (cause, _) in declared.causes.iter().zip(&is_seen).filter(|(_, is_seen)| !**is_seen) {
-                let cause = cause.to_string().to_lowercase();
+                let cause = shown_cause(cause);
                 let message = format!("`{shown}` declares {cause}, but never fails with it");
                 findings.push(Diagnostic::new("declared-never", Severity::Warning, message, span));
             }
@@ -167,10 +162,9 @@ impl Maker<'_, '_> {
             };
             for task in tasks.iter().filter(is_meant) {
                 for row in task.causes.iter().filter(|row| !row.is_mistake) {
-                    let cause = row.cause.split(' ').next().unwrap_or_default();
                     let is_declared = |known: &Symbol| {
-                        let cause = Symbol::keyword(&cause.trim_start_matches(':').to_uppercase());
-                        is_above_cause(forms, &cause, known) || known.name() == "GENERAL-FAILURE"
+                        row.name.as_ref().is_some_and(|cause| is_above_cause(forms, cause, known))
+                            || known.name() == "GENERAL-FAILURE"
                     };
                     if declared.causes.iter().any(is_declared) {
                         continue;

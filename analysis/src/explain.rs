@@ -6,6 +6,7 @@ use std::fmt::Write;
 use esl_compiler::core::{LambdaId, NodeId};
 use rustc_hash::FxHashSet;
 
+use crate::cause::shown_cause;
 use crate::effect::NodeEffect;
 use crate::forms::ScopeKind;
 use crate::guard::FailureId;
@@ -45,11 +46,12 @@ impl Maker<'_, '_> {
             seen: FxHashSet::default(),
             bodies: bodies_of_works(self.flow),
         };
-        let wanted = cause.to_lowercase();
-        tree.line(0, &wanted);
+        let in_lower_case = cause.to_lowercase();
+        let is_wanted = |shown: &str| shown == cause || shown == in_lower_case;
+        tree.line(0, if cause.contains('|') { cause } else { &in_lower_case });
         let mut starts: Vec<(String, FailureId)> = Vec::new();
         for (index, failing) in self.solution.failures.keys.iter().enumerate() {
-            if self.cause(failing.kind) == wanted {
+            if is_wanted(&self.cause(failing.kind)) {
                 starts.push((self.place(failing.form, failing.node).to_string(), index as FailureId));
             }
         }
@@ -117,17 +119,17 @@ impl Maker<'_, '_> {
         let form = &self.flow.forms.forms[code.form as usize];
         let (node, wanted) = match &form.scopes[scope].kind {
             ScopeKind::Recovery { clauses, .. } => {
-                (clauses[position].body, clauses[position].cause.to_string())
+                (clauses[position].body, shown_cause(&clauses[position].cause))
             }
             ScopeKind::Cases { node, types } | ScopeKind::Handlers { node, types } => {
-                (*node, types.get(position).map(ToString::to_string).unwrap_or_default())
+                (*node, types.get(position).map(ToString::to_string).unwrap_or_default().to_lowercase())
             }
             ScopeKind::ClauseBody(_) => return String::new(),
         };
         let function = self.function_around(code.form, form.owners[node.index()]);
         format!(
             "the clause for {} at {}, in {function}",
-            wanted.to_lowercase(),
+            wanted,
             self.place_of(self.span_of_clause(code.form, scope, node))
         )
     }

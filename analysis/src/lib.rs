@@ -55,6 +55,7 @@ use forms::CoreForms;
 use table::Maker;
 use value::{Code, NO_CONTEXT};
 
+pub use cause::shown_cause;
 pub use rights::{NeededRights, needed_rights};
 pub use row::{
     CauseRow, ClauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow, GoalMethod,

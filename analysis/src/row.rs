@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use esl_bytecode::span::{SourceId, Span};
+use esl_bytecode::symbol::Symbol;
 
+use crate::cause::shown_cause;
 use crate::value::TaskKind;
 
 /// A place of a program.
@@ -45,14 +47,28 @@ impl FailureOrigin {
 /// A cause of failures, and where they begin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CauseRow {
-    /// The cause, such as `:timeout`; `any` if it is not known, `unknown` for a function that is not known.
+    /// The cause in words, such as `:timeout`; `any` if it is not known, `unknown` for a function that is not
+    /// known, each with a remark.
     pub cause: String,
+    /// The cause, if it is known.
+    pub name: Option<Symbol>,
     /// Places where the failures begin, in order.
     pub origins: Vec<FailureOrigin>,
     /// Clauses that have taken some of these failures before they went on outward.
     pub spent: Vec<CodePlace>,
     /// Whether it is a programming error.
     pub is_mistake: bool,
+}
+
+impl CauseRow {
+    /// Returns the cause without a remark.
+    pub fn short(&self) -> &str {
+        let end = match &self.name {
+            Some(name) => Some(shown_cause(name).len()),
+            None => self.cause.find(' '),
+        };
+        end.and_then(|end| self.cause.get(..end)).unwrap_or(&self.cause)
+    }
 }
 
 /// A function of the program.
@@ -157,9 +173,9 @@ pub struct FailureTable {
     /// Goals, in the order of the text.
     pub goals: Vec<GoalRow>,
     /// Causes that may leave functions of modules which come with the system, by their names in lower case.
-    pub of_modules: BTreeMap<String, Vec<String>>,
+    pub of_modules: BTreeMap<String, Vec<Symbol>>,
     /// Causes that the program declares for functions, by their names in lower case.
-    pub declared: BTreeMap<String, Vec<String>>,
+    pub declared: BTreeMap<String, Vec<Symbol>>,
     /// Declarations that do not hold, clauses that never apply, and other warnings.
     pub findings: Vec<esl_bytecode::diagnostic::Diagnostic>,
     /// Places that call too many functions to be told apart, in order: the failures of all functions that are

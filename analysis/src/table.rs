@@ -4,14 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use esl_bytecode::compile::MODULE_SOURCES;
 use esl_bytecode::span::Span;
-use esl_bytecode::symbol::symbol_of_setf_cell;
+use esl_bytecode::symbol::{Symbol, symbol_of_setf_cell};
 use esl_compiler::core::{LambdaId, NodeId, NodeKind};
 use esl_compiler::diagnostic::Sources;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::cause::{MISTAKES, cause_of_condition};
+use crate::cause::{MISTAKES, cause_of_condition, shown_cause};
 use crate::declared::{SCRIPTED, declared};
-use crate::effect::{FailureKind, Reason};
+use crate::effect::{FailureKind, Reason, mistake};
 use crate::flow::ValueFlow;
 use crate::forms::{CoreForms, ScopeKind};
 use crate::guard::{FailureId, LeavingFailures};
@@ -111,15 +111,15 @@ impl Maker<'_, '_> {
     /// Returns the text of a cause.
     pub(crate) fn cause(&self, kind: FailureKind) -> String {
         match kind {
-            FailureKind::Cause(name) => self.flow.symbol(name).to_string().to_lowercase(),
+            FailureKind::Cause(name) => shown_cause(self.flow.symbol(name)),
             FailureKind::Below(name) => {
                 let symbol = self.flow.symbol(name);
                 let has_kinds = self.flow.forms.parents.values().any(|parents| parents.contains(symbol));
                 let kinds = if has_kinds { " (or a kind of it)" } else { "" };
-                format!("{}{kinds}", symbol.to_string().to_lowercase())
+                shown_cause(symbol) + kinds
             }
             FailureKind::Condition(name) | FailureKind::CauseOf(name) => {
-                cause_of_condition(self.flow.symbol(name))
+                shown_cause(&cause_of_condition(self.flow.symbol(name)))
             }
             FailureKind::Any(Reason::Computed) => "any (a computed cause)".into(),
             FailureKind::Any(Reason::Code) => "any (code that is made at run time)".into(),
@@ -129,9 +129,20 @@ impl Maker<'_, '_> {
         }
     }
 
+    /// Returns a cause, if it is known.
+    fn name_of_cause(&self, kind: FailureKind) -> Option<Symbol> {
+        match kind {
+            FailureKind::Cause(name) | FailureKind::Below(name) => Some(self.flow.symbol(name).clone()),
+            FailureKind::Condition(name) | FailureKind::CauseOf(name) => {
+                Some(cause_of_condition(self.flow.symbol(name)))
+            }
+            FailureKind::Any(_) | FailureKind::Unknown(_) => None,
+        }
+    }
+
     /// Returns rows of failures, by their causes.
     pub(crate) fn rows(&self, failures: impl IntoIterator<Item = FailureId>, mistakes: u8) -> Vec<CauseRow> {
-        let mut by_cause: BTreeMap<String, (BTreeSet<FailureOrigin>, BTreeSet<CodePlace>)> = BTreeMap::new();
+        let mut by_cause: BTreeMap<String, (Option<Symbol>, BTreeSet<FailureOrigin>)> = BTreeMap::new();
         for failure in failures {
             let failing = self.solution.failures.keys[failure as usize];
             let form = &self.flow.forms.forms[failing.form as usize];
@@ -139,23 +150,30 @@ impl Maker<'_, '_> {
             let span = form.core.nodes[failing.node.index()].span;
             let place = self.place(failing.form, failing.node);
             let origin = FailureOrigin { place, function, range: (span.source.0, span.start, span.end) };
-            by_cause.entry(self.cause(failing.kind)).or_default().0.insert(origin);
+            let entry = by_cause.entry(self.cause(failing.kind)).or_default();
+            entry.0 = self.name_of_cause(failing.kind);
+            entry.1.insert(origin);
         }
-        let row =
-            |(cause, (origins, spent)): (String, (BTreeSet<FailureOrigin>, BTreeSet<CodePlace>))| CauseRow {
-                cause,
-                origins: origins.into_iter().collect(),
-                spent: spent.into_iter().collect(),
-                is_mistake: false,
-            };
+        let row = |(cause, (name, origins)): (String, (Option<Symbol>, BTreeSet<FailureOrigin>))| CauseRow {
+            cause,
+            name,
+            origins: origins.into_iter().collect(),
+            spent: Vec::new(),
+            is_mistake: false,
+        };
         let mut rows: Vec<CauseRow> = by_cause.into_iter().map(row).collect();
         if self.all {
             let kinds = MISTAKES.iter().filter(|(kind, _)| mistakes & kind != 0);
-            rows.extend(kinds.map(|(_, cause)| CauseRow {
-                cause: (*cause).to_string(),
-                origins: Vec::new(),
-                spent: Vec::new(),
-                is_mistake: true,
+            rows.extend(kinds.map(|(kind, cause)| {
+                let name = Symbol::keyword(cause);
+                let remark = if *kind == mistake::CAUSE { " (as a cause)" } else { "" };
+                CauseRow {
+                    cause: shown_cause(&name) + remark,
+                    name: Some(name),
+                    origins: Vec::new(),
+                    spent: Vec::new(),
+                    is_mistake: true,
+                }
             }));
         }
         rows
@@ -200,14 +218,15 @@ impl Maker<'_, '_> {
     }
 
     /// Returns the causes that may leave functions of modules that come with the system.
-    fn of_modules(&self) -> BTreeMap<String, Vec<String>> {
-        let mut rows: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    fn of_modules(&self) -> BTreeMap<String, Vec<Symbol>> {
+        let mut rows: BTreeMap<String, Vec<Symbol>> = BTreeMap::new();
         for (name, (form, node)) in &self.flow.forms.defined {
             if name.name().starts_with('%') || self.is_own(&self.place(*form as u32, *node).source) {
                 continue;
             }
             let Some(leaving) = self.leaving_of(*form as u32, *node) else { continue };
-            let causes = self.rows(leaving.failures.iter().copied(), 0).into_iter().map(|row| row.cause);
+            let causes =
+                self.rows(leaving.failures.iter().copied(), 0).into_iter().filter_map(|row| row.name);
             rows.entry(shown_function(name)).or_default().extend(causes);
         }
         rows.retain(|_, causes| !causes.is_empty());
@@ -412,7 +431,7 @@ fn is_telling(name: &str) -> bool {
 }
 
 /// Returns the name of a function in lower case.
-pub(crate) fn shown_function(symbol: &esl_bytecode::symbol::Symbol) -> String {
+pub(crate) fn shown_function(symbol: &Symbol) -> String {
     match symbol_of_setf_cell(symbol) {
         Some(named) => format!("(setf {})", named.name().to_lowercase()),
         None => symbol.name().to_lowercase(),

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use esl_compiler::core::NodeKind;
 
+use crate::cause::shown_cause;
 use crate::clause::{Clause, ClauseLimit};
 use crate::forms::ScopeKind;
 use crate::guard::{FailureId, LeavingFailures};
@@ -41,7 +42,7 @@ impl Maker<'_, '_> {
                     let resumes = self.solution.resuming.contains(&(form, *node, position));
                     never_ends = !resumes;
                     let answer = answer_of(clause, resumes, taken.iter().any(|(_, goes_on)| *goes_on));
-                    (clause.body, clause.cause.to_string().to_lowercase(), answer)
+                    (clause.body, shown_cause(&clause.cause), answer)
                 }
                 ScopeKind::Cases { node, types } => {
                     let NodeKind::HandlerCase(_, clauses) = text.kind(*node) else { continue };

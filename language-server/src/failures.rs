@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use esl_analysis::{CauseRow, HandlingForm, causes_of_function};
+use esl_analysis::{CauseRow, HandlingForm, causes_of_function, shown_cause};
 use esl_syntax::{NodeId, SyntaxKind, SyntaxTree};
 use lsp_types::{CodeActionKind, CodeActionParams, CodeLens, Command, NumberOrString, TextEdit};
 
@@ -20,18 +20,13 @@ const MAX_PLACES: usize = 8;
 /// Operators of the language whose forms have a lens.
 const HANDLING: [&str; 4] = ["with-recovery-procedures", "handler-case", "handler-bind", "ignore-errors"];
 
-/// Returns a cause in short: `any` for one that is not known.
-fn short(row: &CauseRow) -> &str {
-    row.cause.split(' ').next().unwrap_or_default()
-}
-
 /// Returns the note about the failures of a function, as Markdown.
 pub(super) fn note(project: &Project, text: &OpenText, name: &str) -> Option<String> {
     let inferred = project.inferred.get(text.uri.as_str());
     let table = inferred.as_ref().map(|inferred| &inferred.table);
     let row = table.and_then(|table| table.functions.iter().find(|row| row.name == name));
     if let (Some(row), Some(inferred)) = (row, &inferred) {
-        let shown = may_fail(row.causes.iter().map(short));
+        let shown = may_fail(row.causes.iter().map(CauseRow::short));
         let mut out = shown.unwrap_or_else(|| "No failure leaves it, apart from programming errors.".into());
         if row.fails_as_arguments {
             out.push_str(" It also fails as the functions do that it is given.");
@@ -41,10 +36,10 @@ pub(super) fn note(project: &Project, text: &OpenText, name: &str) -> Option<Str
     }
     let of_table = table.and_then(|table| table.declared.get(name).or_else(|| table.of_modules.get(name)));
     let causes = match of_table {
-        Some(causes) => causes.clone(),
+        Some(causes) => causes.iter().map(shown_cause).collect(),
         None => causes_of_function(name),
     };
-    may_fail(causes.iter().map(|cause| cause.split(' ').next().unwrap_or_default()))
+    may_fail(causes.iter().map(String::as_str))
 }
 
 fn may_fail<'a>(causes: impl Iterator<Item = &'a str>) -> Option<String> {
@@ -69,7 +64,7 @@ fn origins(text: &OpenText, inferred: &InferredText, causes: &[CauseRow]) -> Str
                     format!(", line {} of {file}", origin.place.line)
                 }
             };
-            lines.push(format!("- `{}` begins in `{}`{place}", short(row), origin.function));
+            lines.push(format!("- `{}` begins in `{}`{place}", row.short(), origin.function));
         }
     }
     let rest = lines.len().saturating_sub(MAX_PLACES);
@@ -82,8 +77,8 @@ fn origins(text: &OpenText, inferred: &InferredText, causes: &[CauseRow]) -> Str
 
 /// Returns the causes of a form's failures that clauses take, and those of which some pass.
 fn shares(form: &HandlingForm) -> (BTreeSet<&str>, BTreeSet<&str>) {
-    let passing: BTreeSet<&str> = form.passing.iter().map(short).collect();
-    let taken = form.taken.iter().map(short).filter(|cause| !passing.contains(cause)).collect();
+    let passing: BTreeSet<&str> = form.passing.iter().map(CauseRow::short).collect();
+    let taken = form.taken.iter().map(CauseRow::short).filter(|cause| !passing.contains(cause)).collect();
     (taken, passing)
 }
 
@@ -276,7 +271,7 @@ fn wrapped(
     let name = tree.operator(call)?;
     let row = inferred.table.functions.iter().find(|row| row.name == name)?;
     let causes: BTreeSet<&str> =
-        row.causes.iter().map(short).filter(|cause| cause.starts_with(':')).collect();
+        row.causes.iter().map(CauseRow::short).filter(|cause| cause.starts_with(':')).collect();
     if causes.is_empty() {
         return None;
     }

@@ -1,6 +1,7 @@
 //! Small programs with faults, and what becomes of them.
 
 use esl::program::{Source, compile};
+use esl_bytecode::symbol::Symbol;
 use esl_testing::inject::{InjectSettings, InjectionSubject, KnownFailures, inject};
 use esl_testing::{Setup, list};
 
@@ -9,7 +10,7 @@ fn rows(text: &str, settings: &InjectSettings, known: &[(&str, &str)]) -> Vec<St
     let program = compile(&[Source::new("faults.esl", text)]).program.expect("it compiles");
     let setup = Setup::default();
     let known: KnownFailures =
-        known.iter().map(|(name, cause)| ((*name).into(), vec![(*cause).into()])).collect();
+        known.iter().map(|(name, cause)| ((*name).into(), vec![Symbol::keyword(cause)])).collect();
     let tests = list(&program, &setup).expect("it runs");
     let names: Vec<Option<&str>> =
         if tests.is_empty() { vec![None] } else { tests.iter().map(|test| Some(&*test.name)).collect() };
@@ -40,7 +41,7 @@ fn a_cleanup_tells_careful_from_careless() {
         let text = format!(
             "{WHEELS} (deftest drives (is (with-recovery-procedures ((:wheel-stuck (retry))) {body} t)))"
         );
-        rows(&text, &InjectSettings::default(), &[("drive", ":wheel-stuck")])
+        rows(&text, &InjectSettings::default(), &[("drive", "WHEEL-STUCK")])
     };
     let careless = test("(set-wheels :on) (drive 5) (set-wheels :off)");
     has(&careless, "drive#1:aborted: LEFT ON");
@@ -63,7 +64,7 @@ fn endless_retries_hang() {
         "{WHEELS} (deftest drives (is (with-recovery-procedures ((:wheel-stuck :retries :infinite (sleep 1) (retry)))
                                         (drive 5))))"
     );
-    let found = rows(&text, &InjectSettings::default(), &[("drive", ":wheel-stuck")]);
+    let found = rows(&text, &InjectSettings::default(), &[("drive", "WHEEL-STUCK")]);
     has(&found, "drive#1:wheel-stuck: recovered");
     has(&found, "drive#1+:wheel-stuck: HANGS");
 }
@@ -76,7 +77,7 @@ fn conditions_of_always_are_looked_at() {
          (defun stop () (setf stops (+ stops 1)) (sleep 1) (setf stops 0))
          (deftest drives (is (with-recovery-procedures ((:wheel-stuck (setf stops 1) (stop) (retry))) (drive 5))))"
     );
-    let found = rows(&text, &InjectSettings::default(), &[("drive", ":wheel-stuck")]);
+    let found = rows(&text, &InjectSettings::default(), &[("drive", "WHEEL-STUCK")]);
     has(&found, "drive#1:wheel-stuck: INVARIANT FALSE");
     has(&found, "drive#1:late: recovered");
 }
@@ -117,7 +118,7 @@ fn scripts_give_the_arguments_of_their_failures() {
 #[test]
 fn rows_do_not_depend_on_threads_and_are_repeated_by_name() {
     let text = format!("{WHEELS} (deftest drives (dotimes (i 20) (drive i)) (is t))");
-    let known = [("drive", ":wheel-stuck")];
+    let known = [("drive", "WHEEL-STUCK")];
     let alone = rows(&text, &InjectSettings::default(), &known);
     assert_eq!(alone, rows(&text, &InjectSettings { jobs: 4, ..InjectSettings::default() }, &known));
     assert_eq!(alone.len(), 5 * 4 + 2);
@@ -146,7 +147,7 @@ fn pairs_disturb_remedies() {
          (deftest drives (is (with-recovery-procedures ((:wheel-stuck (reset-wheel) (retry))) (drive 5))))"
     );
     let settings = InjectSettings { pairs: 20, ..InjectSettings::default() };
-    let known = [("drive", ":wheel-stuck")];
+    let known = [("drive", "WHEEL-STUCK")];
     let name = "drive#1:wheel-stuck/reset-wheel#1:never";
     has(&rows(&text, &settings, &known), &format!("{name}: DEADLOCK"));
     let only = InjectSettings { only: Some(name.into()), ..InjectSettings::default() };

@@ -306,10 +306,9 @@ fn failures_after_injected_faults_are_in_the_table() {
         operations.dedup();
         for operation in operations {
             let causes = known.get(&operation.name().to_lowercase()).cloned().unwrap_or_default();
-            let failing = causes.iter().map(|cause| {
-                let cause = Symbol::keyword(&cause.trim_start_matches(':').to_uppercase());
-                ("FAILS", Datum::list(vec![Datum::symbol(cause, span)], span))
-            });
+            let failing = causes
+                .iter()
+                .map(|cause| ("FAILS", Datum::list(vec![Datum::symbol(cause.clone(), span)], span)));
             let others = ["NEVER", "ABORTED"].map(|way| (way, Datum::nil(span)));
             for (way, arguments) in failing.chain(others) {
                 for lasts in [false, true] {

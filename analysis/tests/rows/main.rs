@@ -5,6 +5,7 @@ mod spent;
 
 use esl::program::{Source, compile_with_core};
 use esl_analysis::{AnalysisOptions, CauseRow, FailureTable, analyze};
+use esl_bytecode::symbol::Symbol;
 
 fn table(text: &str) -> FailureTable {
     let mut compiled =
@@ -45,6 +46,22 @@ fn clauses_take_failures_for_good_if_they_leave() {
     check(&clause(":a (if (zerop (random 2)) (retry) (abort 1))"), ":a");
     check(&clause("(:a &rest arguments) (print arguments) (abort nil)"), "");
     check(&clause(":a :retries 0 (abort 1)"), ":a");
+}
+
+#[test]
+fn names_of_causes_are_as_programs_have_them() {
+    let program = "(define-cause :|wheel stuck| ()) (define-cause :|Wheel stuck| ())
+                   (defun f (n) (if n (fail :|wheel stuck|) (fail :|Wheel stuck|)))";
+    check(program, ":|Wheel stuck| :|wheel stuck|");
+    check(
+        &format!("(declaim (fails f :|wheel stuck| :|Wheel stuck|)) {program}"),
+        ":|Wheel stuck| :|wheel stuck|",
+    );
+    let table = table(&format!("(declaim (fails f :|wheel stuck|)) {program}"));
+    let found: Vec<&str> = table.findings.iter().map(|found| found.message.as_str()).collect();
+    assert_eq!(found, ["`f` may fail with :|Wheel stuck|, which it does not declare"]);
+    let causes = &table.causes_by_name()["f"];
+    assert_eq!(causes.iter().map(Symbol::name).collect::<Vec<_>>(), ["Wheel stuck", "wheel stuck"]);
 }
 
 #[test]

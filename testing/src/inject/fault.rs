@@ -187,10 +187,8 @@ impl FailureWays {
         for (operation, causes) in known {
             let ways = self.causes.entry(operation.clone()).or_default();
             for cause in causes {
-                let Some(name) = cause.strip_prefix(':') else { continue };
-                let cause = Symbol::keyword(&name.to_uppercase());
-                if !ways.iter().any(|(other, _)| *other == cause) {
-                    ways.push((cause, Vec::new()));
+                if !ways.iter().any(|(other, _)| other == cause) {
+                    ways.push((cause.clone(), Vec::new()));
                 }
             }
         }

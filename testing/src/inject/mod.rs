@@ -40,6 +40,7 @@ use std::sync::{Mutex, PoisonError};
 
 use esl::Error;
 use esl::program::Program;
+use esl_bytecode::symbol::Symbol;
 
 pub use fault::{FaultWay, InjectedFault};
 pub use outcome::FaultOutcome;
@@ -52,7 +53,7 @@ use outcome::{judge, problem};
 use run::{Runs, counts};
 
 /// Causes with which operations can fail, such as `:timeout`, by the names of these in lower case.
-pub type KnownFailures = BTreeMap<String, Vec<String>>;
+pub type KnownFailures = BTreeMap<String, Vec<Symbol>>;
 
 /// A test, or a whole program, to be run with faults.
 #[derive(Clone, Copy, Debug)]
