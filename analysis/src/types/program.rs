@@ -129,10 +129,10 @@ impl ProgramDefinitions {
             slots: FxHashMap::default(),
         };
         definitions.note_classes(forms, made);
-        definitions.slots = slots::declared(forms)
-            .into_iter()
-            .map(|(slot, declared)| (slot, type_of(&declared, &definitions)))
-            .collect();
+        // Structures may be defined anew, with other types, by code that comes when the program runs.
+        let declared = if is_open { FxHashMap::default() } else { slots::declared(forms) };
+        definitions.slots =
+            declared.into_iter().map(|(slot, declared)| (slot, type_of(&declared, &definitions))).collect();
         definitions
     }
 

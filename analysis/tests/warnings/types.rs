@@ -183,6 +183,7 @@ fn slots_have_their_declared_types() {
         "(defun f (w x) (setf (wheel-radius w) x) (setf (wheel-any w) 'a) (make-wheel :radius x))",
     );
     // Old instances, structures that are defined twice, and values in the place of those that are refused.
+    check_none_with("(load \"wheels.esl\") (defun f (w) (length (wheel-radius w)))");
     check_none_with("(define-upgrade (wheel) (old) (make-wheel :radius (length (wheel-radius old))))");
     check_none(
         "(defstruct a (b 1 :type number)) (defstruct a (b \"\" :type string))
