@@ -2,6 +2,7 @@
 //! innermost handling form of each node, and the definitions that stand at fixed places.
 
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Symbol, setf_cell};
 use esl_compiler::core::{Callee, Core, LambdaId, NodeId, NodeKind, VarId};
 use esl_compiler::{children, lambda_nodes};
@@ -53,14 +54,20 @@ pub(crate) struct CoreForm {
     pub(crate) scope_of: Vec<Option<usize>>,
     /// Scopes; those around others come first.
     pub(crate) scopes: Vec<HandlingScope>,
+    /// Scopes of each lambda.
+    pub(crate) scopes_of: Vec<Vec<usize>>,
     /// Nodes of each lambda.
     pub(crate) nodes_of: Vec<Vec<NodeId>>,
     /// Node of each block.
     pub(crate) block_nodes: Vec<NodeId>,
     /// Whether each node is in the cleanup of an `unwind-protect` of the same lambda.
     pub(crate) in_cleanup: Vec<bool>,
+    /// Variables that have the state of a recovery form.
+    states: FxHashSet<VarId>,
     /// Bodies of the clauses of a lambda that runs clauses, with their positions.
     clause_bodies: FxHashMap<LambdaId, FxHashMap<NodeId, usize>>,
+    /// Calls with keywords among their arguments, by lambda and range, if the form begins tasks with options.
+    option_lists: FxHashMap<(LambdaId, Span), Vec<NodeId>>,
 }
 
 impl CoreForm {
@@ -70,14 +77,18 @@ impl CoreForm {
             owners: vec![LambdaId(0); count],
             scope_of: vec![None; count],
             scopes: Vec::new(),
+            scopes_of: vec![Vec::new(); core.lambdas.len()],
             nodes_of: vec![Vec::new(); core.lambdas.len()],
             block_nodes: vec![NodeId(0); core.blocks.len()],
             in_cleanup: vec![false; count],
+            states: FxHashSet::default(),
             clause_bodies: FxHashMap::default(),
+            option_lists: FxHashMap::default(),
             core,
         };
         form.note_places();
         form.note_cleanups();
+        form.note_option_lists();
         form
     }
 
@@ -93,7 +104,7 @@ impl CoreForm {
             while let Some((node, scope)) = row.pop() {
                 let bodies = self.clause_bodies.get(&lambda);
                 let scope = match bodies.and_then(|bodies| bodies.get(&node)) {
-                    Some(position) => Some(self.add_scope(ScopeKind::ClauseBody(*position), scope)),
+                    Some(position) => Some(self.add_scope(lambda, ScopeKind::ClauseBody(*position), scope)),
                     None => scope,
                 };
                 self.owners[node.index()] = lambda;
@@ -121,31 +132,56 @@ impl CoreForm {
 
     /// Whether a variable has the state of a recovery form, to which its clauses leave.
     pub(crate) fn is_state(&self, variable: VarId) -> bool {
-        self.clause_bodies.keys().any(|lambda| {
-            let first = self.core.lambdas[lambda.index()].required.first();
-            first.is_some_and(|parameter| parameter.variable == variable)
-        })
+        self.states.contains(&variable)
+    }
+
+    /// Whether a node begins a task with options: a call of `%spawn`.
+    fn begins_with_options(&self, node: NodeId) -> bool {
+        matches!(self.kind(node), NodeKind::Call(callee, arguments)
+            if arguments.len() > 1 && symbol_of(callee).is_some_and(|symbol| symbol.name() == "%SPAWN"))
+    }
+
+    /// Notes the lists in which the options of tasks may be.
+    fn note_option_lists(&mut self) {
+        let mut all = (0..self.core.nodes.len() as u32).map(NodeId);
+        if !all.any(|node| self.begins_with_options(node)) {
+            return;
+        }
+        let is_keyword = |item: &NodeId| self.symbol(*item).is_some_and(Symbol::is_keyword);
+        let mut lists: FxHashMap<(LambdaId, Span), Vec<NodeId>> = FxHashMap::default();
+        for (index, nodes) in self.nodes_of.iter().enumerate() {
+            for node in nodes {
+                if let NodeKind::Call(_, items) = self.kind(*node)
+                    && items.iter().step_by(2).any(is_keyword)
+                {
+                    let key = (LambdaId(index as u32), self.core.nodes[node.index()].span);
+                    lists.entry(key).or_default().push(*node);
+                }
+            }
+        }
+        self.option_lists = lists;
     }
 
     /// Returns the value of an option of the `spawn` whose call of `%spawn` a node is, not of one in its
     /// body.
     pub(crate) fn spawn_option(&self, node: NodeId, name: &str) -> Option<NodeId> {
-        let is_spawn = matches!(self.kind(node), NodeKind::Call(callee, arguments)
-            if arguments.len() > 1 && symbol_of(callee).is_some_and(|symbol| symbol.name() == "%SPAWN"));
-        let around = self.core.nodes[node.index()].span;
+        if !self.begins_with_options(node) {
+            return None;
+        }
+        // The macro makes the list of the options, too, so that both have the range of its call.
+        let key = (self.owners[node.index()], self.core.nodes[node.index()].span);
         let is_name =
             |item: &NodeId| self.symbol(*item).is_some_and(|key| key.is_keyword() && key.name() == name);
-        let owner = self.owners[node.index()];
-        let mut here = self.nodes_of[owner.index()].iter().filter(|_| is_spawn);
-        here.find_map(|list| {
+        self.option_lists.get(&key)?.iter().find_map(|list| {
             let NodeKind::Call(_, items) = self.kind(*list) else { return None };
-            let position = items.iter().position(is_name).filter(|position| position % 2 == 0)?;
-            let is_inside = around.contains(self.core.nodes[items[position].index()].span);
+            let position = items.iter().step_by(2).position(is_name)? * 2;
+            let is_inside = key.1.contains(self.core.nodes[items[position].index()].span);
             items.get(position + 1).copied().filter(|_| is_inside)
         })
     }
 
-    fn add_scope(&mut self, kind: ScopeKind, parent: Option<usize>) -> usize {
+    fn add_scope(&mut self, owner: LambdaId, kind: ScopeKind, parent: Option<usize>) -> usize {
+        self.scopes_of[owner.index()].push(self.scopes.len());
         self.scopes.push(HandlingScope { kind, parent });
         self.scopes.len() - 1
     }
@@ -159,6 +195,7 @@ impl CoreForm {
         pending: &mut Vec<LambdaId>,
     ) {
         let kind = self.core.nodes[node.index()].kind.clone();
+        let owner = self.owners[node.index()];
         let mut inner = None;
         match &kind {
             NodeKind::Lambda(lambda) => pending.push(*lambda),
@@ -169,21 +206,23 @@ impl CoreForm {
             NodeKind::Recovery { table, procedures, body } => {
                 if let NodeKind::Lambda(lambda) = self.core.nodes[procedures.index()].kind {
                     let (clauses, bodies) = clauses_of(&self.core, *table, lambda);
+                    let state = self.core.lambdas[lambda.index()].required.first();
+                    self.states.extend(state.map(|parameter| parameter.variable));
                     let places = self.clause_bodies.entry(lambda).or_default();
                     for (position, body) in bodies.into_iter().enumerate() {
                         places.entry(body).or_insert(position);
                     }
                     let kind = ScopeKind::Recovery { node, clauses, procedures: lambda };
-                    inner = Some((*body, self.add_scope(kind, scope)));
+                    inner = Some((*body, self.add_scope(owner, kind, scope)));
                 }
             }
             NodeKind::HandlerCase(body, clauses) => {
                 let types = clauses.iter().map(|clause| clause.condition_type.clone()).collect();
-                inner = Some((*body, self.add_scope(ScopeKind::Cases { node, types }, scope)));
+                inner = Some((*body, self.add_scope(owner, ScopeKind::Cases { node, types }, scope)));
             }
             NodeKind::Handlers(list, body) => {
                 let types = leaving_handlers(&self.core, *list);
-                inner = Some((*body, self.add_scope(ScopeKind::Handlers { node, types }, scope)));
+                inner = Some((*body, self.add_scope(owner, ScopeKind::Handlers { node, types }, scope)));
             }
             _ => {}
         }

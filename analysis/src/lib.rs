@@ -31,6 +31,7 @@ mod library;
 mod many;
 mod objects;
 mod orders;
+mod pending;
 mod resuming;
 mod rights;
 mod row;

@@ -8,8 +8,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::effect::{FailureKind, NodeEffect, mistake};
 use crate::flow::{RunningCode, ValueFlow};
-use crate::forms::{CoreForm, ScopeKind};
+use crate::forms::ScopeKind;
 use crate::guard::{FailureFacts, FailureId, Handled, LeavingFailures, recover, take};
+use crate::pending::PendingCode;
 use crate::resuming::resuming_clauses;
 use crate::value::{Code, Numbering, Spot, WorkId, WorkKey};
 
@@ -20,9 +21,6 @@ pub(crate) struct Failing {
     pub(crate) form: u32,
     pub(crate) node: NodeId,
 }
-
-/// Most rounds until the sets no longer change.
-const MOST_ROUNDS: usize = 500;
 
 /// The result of the analysis of effects.
 #[derive(Debug, Default)]
@@ -38,8 +36,10 @@ pub(crate) struct Solution {
     of_many: LeavingFailures,
     /// Failures that end each task.
     pub(crate) of_works: Vec<LeavingFailures>,
-    /// Whether further failures have been caught, or found in interrupted code, in this round.
-    has_found: bool,
+    /// Code that waits to be looked at.
+    pending: PendingCode,
+    /// Failures of which more interrupted code is known since the round began.
+    further_interrupted: FxHashSet<FailureId>,
     /// Failures that interrupt code, with the failures of that code and of the clauses that run in it.
     interrupted: FxHashMap<FailureId, LeavingFailures>,
     /// Causes of the clauses in `resuming`.
@@ -58,23 +58,20 @@ pub(crate) fn solve(flow: &ValueFlow<'_>) -> Solution {
         leaving: vec![LeavingFailures::default(); flow.running.len()],
         of_works: vec![LeavingFailures::default(); flow.works.len()],
         resuming: resuming_clauses(flow.forms),
+        pending: PendingCode::new(flow),
         ..Solution::default()
     };
     solution.resuming_causes = causes_of(flow, &solution.resuming);
     let bodies = bodies_of_works(flow);
-    for _ in 0..MOST_ROUNDS {
-        let mut has_changed = false;
-        for number in flow.many.codes.iter().filter_map(|code| flow.number_of(*code)) {
-            solution.of_many.add(&solution.leaving[number]);
+    loop {
+        while let Some(number) = solution.pending.next_code() {
+            solution.look_at(flow, number);
         }
-        for number in (0..flow.running.len()).rev() {
-            has_changed |= solution.look_at(flow, number);
+        while let Some(work) = solution.pending.next_work() {
+            solution.end_work(flow, work, &bodies[work.index()]);
         }
-        for (index, codes) in bodies.iter().enumerate() {
-            has_changed |= solution.end_work(flow, WorkId(index as u32), codes);
-        }
-        has_changed |= std::mem::take(&mut solution.has_found);
-        if !has_changed {
+        solution.look_at_interrupted_again(flow);
+        if !solution.pending.begin_round() {
             break;
         }
     }
@@ -141,19 +138,56 @@ impl Solution {
         leaving
     }
 
-    /// Finds the failures that end a task. Returns whether some are new.
-    fn end_work(&mut self, flow: &ValueFlow<'_>, work: WorkId, codes: &[Code]) -> bool {
+    /// Finds the failures that end a task.
+    fn end_work(&mut self, flow: &ValueFlow<'_>, work: WorkId, codes: &[Code]) {
         let mut all = LeavingFailures::default();
         for code in codes {
             if let Some(number) = flow.number_of(*code) {
                 all.add(&self.leaving[number]);
             }
         }
-        self.of_works[work.index()].add(&all)
+        if self.of_works[work.index()].add(&all) {
+            self.pending.change_work(work);
+        }
     }
 
-    /// Finds the failures that leave a piece of code. Returns whether some are new.
-    fn look_at(&mut self, flow: &ValueFlow<'_>, number: usize) -> bool {
+    /// Has the handling forms looked at again that see failures of which more interrupted code is known.
+    fn look_at_interrupted_again(&mut self, flow: &ValueFlow<'_>) {
+        let changed = std::mem::take(&mut self.further_interrupted);
+        if changed.is_empty() {
+            return;
+        }
+        let sees = |leaving: &LeavingFailures| {
+            leaving.failures.iter().chain(&leaving.stopped).any(|failure| changed.contains(failure))
+        };
+        for ((number, scope), handled) in &self.handled {
+            let code = flow.running[*number].code;
+            let form = &flow.forms.forms[code.form as usize];
+            let is_in_clause = match &form.scopes[*scope].kind {
+                ScopeKind::Recovery { clauses, procedures, .. } => {
+                    let runner = flow.number_of(Code { lambda: *procedures, ..code });
+                    let mut effects =
+                        (0..clauses.len()).filter_map(|one| self.of_clauses.get(&(runner?, one)));
+                    effects.any(sees)
+                }
+                _ => false,
+            };
+            if is_in_clause || sees(&handled.arriving) {
+                self.pending.add(*number);
+            }
+        }
+    }
+
+    /// Notes that a failure interrupts code that can fail so.
+    fn interrupt(&mut self, failure: FailureId, inside: &LeavingFailures) {
+        let is_new = !self.interrupted.contains_key(&failure);
+        if self.interrupted.entry(failure).or_default().add(inside) || is_new {
+            self.further_interrupted.insert(failure);
+        }
+    }
+
+    /// Finds the failures that leave a piece of code.
+    fn look_at(&mut self, flow: &ValueFlow<'_>, number: usize) {
         let running = &flow.running[number];
         let code = running.code;
         let form = &flow.forms.forms[code.form as usize];
@@ -172,9 +206,8 @@ impl Solution {
         }
         let mut has_changed = false;
         // Those around others come first.
-        for scope in (0..form.scopes.len()).rev() {
-            let is_here = scopes.contains_key(&scope) || self.is_in(form, scope, code);
-            if !is_here {
+        for scope in form.scopes_of[code.lambda.index()].iter().rev().copied() {
+            if !scopes.contains_key(&scope) && form.scopes[scope].kind.node().is_none() {
                 continue;
             }
             let inside = scopes.remove(&scope).unwrap_or_default();
@@ -194,7 +227,12 @@ impl Solution {
                 None => _ = result.add(&out),
             }
         }
-        has_changed | self.leaving[number].add(&result)
+        if self.leaving[number].add(&result) || has_changed {
+            self.pending.change_code(number);
+        }
+        if self.pending.is_of_many(number) && self.of_many.add(&self.leaving[number]) {
+            self.pending.change_many();
+        }
     }
 
     /// Notes which failures interrupt the code that a piece of code calls, and how that can fail.
@@ -232,14 +270,9 @@ impl Solution {
                 inside.failures.extend(&self.leaving[called].failures);
             }
             for failure in failures {
-                self.has_found |= self.interrupted.entry(failure).or_default().add(&inside);
+                self.interrupt(failure, &inside);
             }
         }
-    }
-
-    /// Whether a scope is one of the lambda of a piece of code.
-    fn is_in(&self, form: &CoreForm, scope: usize, code: Code) -> bool {
-        form.scopes[scope].kind.node().is_some_and(|node| form.owners[node.index()] == code.lambda)
     }
 
     /// Returns the failures that leave a handling form.
@@ -271,11 +304,9 @@ impl Solution {
                 let handled = recover(&known, inside, clauses, &effects, &resumes);
                 // The effects of a clause are those of the code that has called it.
                 for (failure, clauses) in &handled.interrupted {
-                    let row = self.interrupted.entry(*failure).or_default();
                     for clause in clauses {
-                        let before = row.failures.len();
-                        row.failures.extend(&effects[*clause].failures);
-                        self.has_found |= row.failures.len() != before;
+                        let failures = effects[*clause].failures.clone();
+                        self.interrupt(*failure, &LeavingFailures { failures, ..LeavingFailures::default() });
                     }
                 }
                 (handled, None)
@@ -286,20 +317,22 @@ impl Solution {
                 // All handlers see the signalled condition.
                 let mut all = LeavingFailures::default();
                 all.add(inside);
-                let is_new = self.caught.entry(spot(*node)).or_default().add(&all);
-                self.has_found |= is_new;
+                if self.caught.entry(spot(*node)).or_default().add(&all) {
+                    self.pending.change_caught(spot(*node));
+                }
                 (handled, None)
             }
             ScopeKind::ClauseBody(_) => return inside.clone(),
         };
         if let Some(guard) = guard {
-            let caught = self.caught.entry(guard).or_default();
             let all = LeavingFailures {
                 failures: handled.taken.iter().flatten().map(|(failure, _)| *failure).collect(),
                 mistakes: handled.mistakes.iter().fold(0, |all, one| all | one),
                 ..LeavingFailures::default()
             };
-            self.has_found |= caught.add(&all);
+            if self.caught.entry(guard).or_default().add(&all) {
+                self.pending.change_caught(guard);
+            }
         }
         let leaving = handled.leaving.clone();
         self.handled.insert((number, scope), handled);
@@ -325,7 +358,9 @@ impl Solution {
             NodeEffect::Absorb(_) | NodeEffect::Start(_) | NodeEffect::Body(..) | NodeEffect::FailAll(_) => {}
             NodeEffect::Limit(work, cause) => {
                 let failure = self.failure(FailureKind::Cause(cause), code.form, node);
-                self.of_works[work.index()].failures.insert(failure);
+                if self.of_works[work.index()].failures.insert(failure) {
+                    self.pending.change_work(work);
+                }
             }
             NodeEffect::Fail(kind) => {
                 let failure = self.failure(kind, code.form, node);

@@ -295,10 +295,8 @@ impl Maker<'_, '_> {
                 pending.extend(self.flow.called_by(effect));
             }
             let form = &self.flow.forms.forms[code.form as usize];
-            for scope in &form.scopes {
-                if let ScopeKind::Recovery { node, procedures, .. } = &scope.kind
-                    && form.owners[node.index()] == code.lambda
-                {
+            for scope in &form.scopes_of[code.lambda.index()] {
+                if let ScopeKind::Recovery { procedures, .. } = &form.scopes[*scope].kind {
                     pending.push(Code { lambda: *procedures, ..code });
                 }
             }
@@ -313,9 +311,9 @@ impl Maker<'_, '_> {
             for number in self.reach(codes) {
                 let code = self.flow.running[number].code;
                 let form = &self.flow.forms.forms[code.form as usize];
-                for scope in 0..form.scopes.len() {
-                    let found = (0..64).map_while(|position| by_scope.get(&(code.form, scope, position)));
-                    if self.solution.handled.contains_key(&(number, scope)) {
+                for scope in &form.scopes_of[code.lambda.index()] {
+                    let found = (0..).map_while(|position| by_scope.get(&(code.form, *scope, position)));
+                    if self.solution.handled.contains_key(&(number, *scope)) {
                         rows.extend(found);
                     }
                 }

@@ -488,3 +488,25 @@ fn too_many_functions_at_a_place_count_together() {
     assert_eq!(help(&small), None);
     assert!(help(&large).is_some_and(|text| text.starts_with("too many functions may be called at")));
 }
+
+#[test]
+fn failures_pass_as_many_tasks_as_there_are() {
+    // The functions are found from the innermost to the outermost.
+    let mut text = String::from("(defun f0 () (fail :a))\n");
+    for number in 1..700 {
+        text.push_str(&format!("(defun f{number} () (task-net (part (f{}))))\n", number - 1));
+    }
+    text.push_str("(defun f () (f699))\n");
+    for number in 0..700 {
+        text.push_str(&format!("(f{number})\n"));
+    }
+    check(&text, ":a");
+}
+
+#[test]
+fn a_task_has_all_clauses_of_a_form() {
+    let clauses: Vec<String> = (0..100).map(|number| format!("(:c{number} (abort))")).collect();
+    let text = format!("(with-recovery-procedures ({}) (fail :c99))", clauses.join(" "));
+    let table = table(&text);
+    assert_eq!(table.tasks[0].clauses.len(), 100);
+}
