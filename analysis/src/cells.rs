@@ -105,7 +105,7 @@ struct Cell<W> {
 
 /// A cell has new values, or a new watcher.
 #[derive(Debug)]
-enum Arrival<W> {
+enum SentValues<W> {
     Values(CellId),
     Watcher(W, CellId),
 }
@@ -116,7 +116,7 @@ pub(crate) struct Cells<W> {
     cells: Vec<Cell<W>>,
     /// The cell that each one has become a part of, or itself.
     merged: Vec<CellId>,
-    queue: VecDeque<Arrival<W>>,
+    queue: VecDeque<SentValues<W>>,
     /// Copies from cells to cells.
     copies: usize,
     /// Work at which cycles are looked for.
@@ -187,7 +187,7 @@ impl<W: Copy + Eq + std::hash::Hash> Cells<W> {
 
     fn enqueue(&mut self, cell: CellId) {
         if !std::mem::replace(&mut self.cells[cell.index()].is_queued, true) {
-            self.queue.push_back(Arrival::Values(cell));
+            self.queue.push_back(SentValues::Values(cell));
         }
     }
 
@@ -233,7 +233,7 @@ impl<W: Copy + Eq + std::hash::Hash> Cells<W> {
         if place.watching.insert(watcher) {
             place.watchers.push(watcher);
             if place.values.count > 0 {
-                self.queue.push_back(Arrival::Watcher(watcher, cell));
+                self.queue.push_back(SentValues::Watcher(watcher, cell));
             }
         }
     }
@@ -247,12 +247,12 @@ impl<W: Copy + Eq + std::hash::Hash> Cells<W> {
                 self.next_search = self.sent + WORK_BETWEEN_SEARCHES.max(2 * self.copies);
             }
             match self.queue.pop_front()? {
-                Arrival::Watcher(watcher, cell) => {
+                SentValues::Watcher(watcher, cell) => {
                     let cell = self.find(cell);
                     let values = self.cells[cell.index()].values.clone();
                     return Some(Sending { cell, values, watchers: vec![watcher] });
                 }
-                Arrival::Values(cell) => {
+                SentValues::Values(cell) => {
                     if self.merged[cell.index()] != cell {
                         continue;
                     }
