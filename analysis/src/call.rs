@@ -33,6 +33,9 @@ fn has_known_keys(lambda: &Lambda, arguments: &CallArguments) -> bool {
     further.len() % 2 == 0 && further.chunks(2).all(|pair| pair[0].1.as_ref().is_some_and(is_known))
 }
 
+/// Arguments whose positions matter to functions of the library that are called as values.
+const MOST_POSITIONS: usize = 3;
+
 impl ValueFlow<'_> {
     /// Calls a global function by its name.
     pub(crate) fn call_named(
@@ -126,8 +129,26 @@ impl ValueFlow<'_> {
         } else if is_of_library(&symbol) && point.passing == Passing::Through {
             // A name such as LIST is found among the causes too.
             let value = point.result.unwrap_or_else(|| self.at(point.spot));
-            self.call_library(point.spot, &symbol, &[], point.arguments.clone(), value);
+            let mut arguments = point.arguments.clone();
+            self.give_positions(point.spot, &mut arguments);
+            self.call_library(point.spot, &symbol, &[], arguments, value);
         }
+    }
+
+    /// Has arguments without a position be those at the first ones, too.
+    fn give_positions(&mut self, spot: Spot, arguments: &mut CallArguments) {
+        if arguments.any.is_empty() && arguments.lists.is_empty() {
+            return;
+        }
+        let open = self.thing(ThingKey::Made(spot, u8::MAX - 3));
+        let open = self.cell(CellKey::Contents(open));
+        for any in &arguments.any {
+            self.copy(*any, open);
+        }
+        for list in &arguments.lists {
+            self.watch(*list, FlowWatcher::Contents(open));
+        }
+        arguments.given.resize(arguments.given.len().max(MOST_POSITIONS), (open, None));
     }
 
     fn call_closure(&mut self, point: &CallPoint, code: Code) {
@@ -233,9 +254,30 @@ impl ValueFlow<'_> {
         value: CellId,
         positions: Option<&[usize]>,
     ) {
+        let (inside, returned) = self.call_with_arguments(spot, arguments, value, positions);
+        for (cell, _) in &arguments.given {
+            self.copy(*cell, value);
+        }
+        for cell in arguments.lists.iter().chain(&arguments.any) {
+            self.copy(*cell, value);
+        }
+        self.copy(inside, value);
+        self.copy(inside, returned);
+        self.copy(returned, value);
+    }
+
+    /// Does so, and puts an object with the values of the functions at `to`, and nothing else. Returns the
+    /// cells of the contents of the arguments and of that object.
+    pub(crate) fn call_with_arguments(
+        &mut self,
+        spot: Spot,
+        arguments: &CallArguments,
+        to: CellId,
+        positions: Option<&[usize]>,
+    ) -> (CellId, CellId) {
         let inside = self.thing(ThingKey::Made(spot, 1));
         let inside = self.cell(CellKey::Contents(inside));
-        let returned = self.make(spot, 2, value);
+        let returned = self.make(spot, 2, to);
         let cells: Vec<CellId> =
             arguments.given.iter().map(|(cell, _)| *cell).chain(arguments.lists.iter().copied()).collect();
         let any = arguments.any.clone();
@@ -249,7 +291,6 @@ impl ValueFlow<'_> {
         passed.sort_unstable();
         passed.dedup();
         for (index, cell) in cells.iter().chain(&any).enumerate() {
-            self.copy(*cell, value);
             let is_other = positions.is_some_and(|positions| !positions.contains(&index));
             if is_other && index < arguments.given.len() {
                 continue;
@@ -258,9 +299,7 @@ impl ValueFlow<'_> {
             let function = if arguments.lists.contains(cell) { inside } else { *cell };
             self.call_values(spot, function, given, Some(returned), Passing::Through, positions.is_some());
         }
-        self.copy(inside, value);
-        self.copy(inside, returned);
-        self.copy(returned, value);
+        (inside, returned)
     }
 
     /// Fails with a value: a cause, or a condition.

@@ -3,6 +3,8 @@
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::{BoundVariable, Callee, NodeId, NodeKind, Parameter};
 
+use crate::cause::mistakes_named;
+use crate::clause::Clause;
 use crate::effect::{NodeEffect, mistake};
 use crate::flow::{CallArguments, CallPoint, FlowWatcher, Passing, ValueFlow};
 use crate::forms::symbols_inside;
@@ -215,6 +217,14 @@ impl ValueFlow<'_> {
                 if let NodeKind::Lambda(lambda) = form.kind(*procedures) {
                     let code = Code { lambda: *lambda, ..here.code };
                     self.run(code);
+                    let result = self.cell(CellKey::Return(code));
+                    let replacements = self.cell(CellKey::Replacements);
+                    self.copy(result, replacements);
+                    let takes_mistakes = |clause: &Clause| mistakes_named(clause.cause.name()) != (0, 0);
+                    if form.clauses(node).iter().any(takes_mistakes) {
+                        let replacements = self.cell(CellKey::ReplacementsOfMistakes);
+                        self.copy(result, replacements);
+                    }
                     let thing = self.thing(ThingKey::FailureArguments);
                     if let Some(parameter) = form.core.lambdas[lambda.index()].required.get(2) {
                         let variable =

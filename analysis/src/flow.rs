@@ -269,7 +269,24 @@ impl<'a> ValueFlow<'a> {
             let owner = form.owners[spot.node.index()];
             let running = self.run(Code { form: spot.form, lambda: owner, context: spot.context });
             self.running[running].effects.push((spot.node, effect));
+            self.replace(spot, effect);
         }
+    }
+
+    /// Has the values of clauses flow to a call that fails.
+    fn replace(&mut self, spot: Spot, effect: NodeEffect) {
+        let key = match effect {
+            NodeEffect::Mistake(_) => CellKey::ReplacementsOfMistakes,
+            NodeEffect::Fail(_)
+            | NodeEffect::FailAs(_)
+            | NodeEffect::FailAllWith(_)
+            | NodeEffect::Again(_)
+            | NodeEffect::AgainByCause(_)
+            | NodeEffect::FailByCauseOf(_) => CellKey::Replacements,
+            _ => return,
+        };
+        let (replacements, value) = (self.cell(key), self.at(spot));
+        self.copy(replacements, value);
     }
 
     /// Returns the number of a piece of code, which is looked at if it is new.

@@ -130,6 +130,15 @@ impl CoreForm {
         }
     }
 
+    /// Returns the clauses of a recovery form.
+    pub(crate) fn clauses(&self, form: NodeId) -> &[Clause] {
+        let clauses = self.scopes.iter().find_map(|scope| match &scope.kind {
+            ScopeKind::Recovery { node, clauses, .. } if *node == form => Some(clauses.as_slice()),
+            _ => None,
+        });
+        clauses.unwrap_or_default()
+    }
+
     /// Whether a variable has the state of a recovery form, to which its clauses leave.
     pub(crate) fn is_state(&self, variable: VarId) -> bool {
         self.states.contains(&variable)

@@ -49,7 +49,7 @@ impl ValueFlow<'_> {
         values.map(|value| self.objects.standing_for(value)).filter(|value| seen.insert(*value)).collect()
     }
 
-    /// Joins the objects that have become equal: their contents are one cell, and so are their first elements.
+    /// Joins the objects that have become equal: their contents are one cell, as their first elements are.
     pub(crate) fn join_equal_objects(&mut self) {
         let mut by_cells: FxHashMap<(CellId, CellId), ThingId> = FxHashMap::default();
         for number in 0..self.things.keys.len() as u32 {

@@ -128,6 +128,10 @@ pub(crate) enum CellKey {
     Thrown,
     /// Facts.
     Facts,
+    /// Values of clauses, which stand for those of failed calls.
+    Replacements,
+    /// Values of clauses for programming errors.
+    ReplacementsOfMistakes,
     /// Arguments of calls of too many functions.
     ManyArguments,
     /// Values of such calls.

@@ -1,11 +1,12 @@
 //! Functions of data: lists, vectors, tables, slots, properties, facts.
 
 use esl_bytecode::builtin::{Builtin, Shares};
+use esl_bytecode::kind::ValueType;
 
 use super::LibraryCall;
 use crate::effect::{FailureKind, NodeEffect, Reason};
 use crate::flow::{CallArguments, FlowWatcher, ValueFlow};
-use crate::value::{CellKey, FlowValue, ThingKey};
+use crate::value::{CellId, CellKey, FlowValue, ThingKey};
 
 /// Functions that return an element.
 const ELEMENTS: &[&str] = &[
@@ -109,6 +110,97 @@ pub(super) const CALLS_NO_ARGUMENT: &[&str] =
 /// that.
 pub(super) const PRINTING: &[&str] = &["PRIN1", "PRINC", "WRITE-STRING", "WRITE-LINE", "WRITE-CHAR"];
 
+/// The value of a function that calls its arguments.
+enum ReturnedValue {
+    /// A list of the values of the functions.
+    Results,
+    /// A value of a function.
+    Result,
+    /// The second argument, or a part of that list.
+    Second,
+    /// An element of the second argument.
+    ElementOfSecond,
+    /// A number or a truth value.
+    Data,
+}
+
+/// Values of functions that call their arguments. Those of the others are any of these.
+const KNOWN_VALUES: &[(&[&str], ReturnedValue)] = &[
+    (&["MAPCAR", "MAPLIST"], ReturnedValue::Results),
+    (&["EVERY", "SOME"], ReturnedValue::Result),
+    (&["MAPC", "MAPL", "MEMBER", "MEMBER-IF", "MEMBER-IF-NOT"], ReturnedValue::Second),
+    (
+        &["ASSOC", "ASSOC-IF", "ASSOC-IF-NOT", "RASSOC", "RASSOC-IF", "RASSOC-IF-NOT"],
+        ReturnedValue::ElementOfSecond,
+    ),
+    (
+        &[
+            "NOTANY",
+            "NOTEVERY",
+            "POSITION",
+            "POSITION-IF",
+            "POSITION-IF-NOT",
+            "COUNT",
+            "COUNT-IF",
+            "COUNT-IF-NOT",
+            "SUBSETP",
+            "SEARCH",
+            "MISMATCH",
+            "TREE-EQUAL",
+            "MAPHASH",
+        ],
+        ReturnedValue::Data,
+    ),
+];
+
+/// A thing that a function stores.
+enum StoredThing {
+    /// The argument at this position.
+    Argument(usize),
+    /// The last argument.
+    Last,
+    /// The elements of the argument at this position, which is a part of the other one then.
+    Contents(usize),
+}
+
+/// Names of functions, and the things that these store, each with the position of the argument that changes.
+type StoringRow = (&'static [&'static str], &'static [(StoredThing, usize)]);
+
+/// Functions that change an argument. The others may store each argument in each.
+const STORING: &[StoringRow] = &[
+    (&["%PUTHASH"], &[(StoredThing::Argument(0), 1), (StoredThing::Argument(2), 1)]),
+    (&["%SET-TABLE-VALUE", "%TABLE-ADD"], &[(StoredThing::Argument(2), 0), (StoredThing::Argument(3), 0)]),
+    (&["RPLACA", "%SET-CAR", "%FILL", "FILL", "%FILL-MORE"], &[(StoredThing::Argument(1), 0)]),
+    (&["RPLACD", "%SET-CDR", "NRECONC"], &[(StoredThing::Argument(1), 0), (StoredThing::Contents(1), 0)]),
+    (&["%PUTF"], &[(StoredThing::Argument(1), 0), (StoredThing::Argument(2), 0)]),
+    (&["%REPLACE", "REPLACE"], &[(StoredThing::Contents(1), 0)]),
+    (&["VECTOR-PUSH", "VECTOR-PUSH-EXTEND"], &[(StoredThing::Argument(0), 1)]),
+    (&["%SET-NTH"], &[(StoredThing::Argument(2), 1)]),
+    (&["%SET-ELT", "%SET-SVREF", "%SET-AREF", "%SET-ROW-MAJOR-AREF"], &[(StoredThing::Last, 0)]),
+    (
+        &[
+            "REMHASH",
+            "CLRHASH",
+            "%TABLE-DELETE",
+            "%ADD-TO-VALUE",
+            "%REMF",
+            "NREVERSE",
+            "NBUTLAST",
+            "%SET-CHAR",
+        ],
+        &[],
+    ),
+];
+
+/// Whether a builtin has numbers, texts or truth values as values, and nothing else.
+fn gives_data(builtin: Option<Builtin>) -> bool {
+    const DATA: ValueType =
+        ValueType::NUMBER.or(ValueType::CHARACTER).or(ValueType::STRING).or(ValueType::SYMBOL);
+    let Some(info) = builtin.map(Builtin::info) else { return false };
+    info.gives.is_some_and(|gives| gives.and(DATA) == gives)
+        && !matches!(info.name, "MAKUNBOUND" | "TASK-STATUS")
+}
+
 impl ValueFlow<'_> {
     /// Looks at a call of a function of data. Returns whether it is one.
     pub(super) fn call_of_data(&mut self, call: &LibraryCall<'_>) -> bool {
@@ -191,6 +283,16 @@ impl ValueFlow<'_> {
                     self.watch(from, FlowWatcher::Contents(call.value));
                 }
             }
+            "MAKE-HASH-TABLE" | "MAKE-ARRAY" | "MAKE-LIST" => {
+                let contents = self.make(call.spot, 0, call.value);
+                for (from, _) in &call.arguments.given {
+                    self.copy(*from, contents);
+                    self.watch(*from, FlowWatcher::AllContents(contents));
+                }
+                for list in call.arguments.lists.iter().chain(&call.arguments.any) {
+                    self.watch(*list, FlowWatcher::AllContents(contents));
+                }
+            }
             "CAR" | "FIRST" => {
                 for (from, _) in &call.arguments.given {
                     self.watch(*from, FlowWatcher::First(call.value));
@@ -212,17 +314,91 @@ impl ValueFlow<'_> {
                 self.any_list(call);
             }
             _ if WITHOUT_PARTS.contains(&call.name) => {}
-            _ if changes_arguments(call.name) => {
-                for (from, _) in &call.arguments.given {
-                    for (to, _) in &call.arguments.given {
-                        self.watch(*to, FlowWatcher::Store(*from));
-                    }
-                }
-                self.return_parts(call);
-            }
+            _ if changes_arguments(call) => self.change(call),
+            _ if gives_data(call.builtin) => {}
             _ => return false,
         }
         true
+    }
+
+    /// Calls functions among the arguments, if the value of the call is known: of the values of these, or of
+    /// one argument. Returns whether it is.
+    pub(super) fn call_for_known_value(
+        &mut self,
+        call: &LibraryCall<'_>,
+        positions: Option<&[usize]>,
+    ) -> bool {
+        let Some((_, known)) = KNOWN_VALUES.iter().find(|(names, _)| names.contains(&call.name)) else {
+            return false;
+        };
+        if call.nodes.is_empty() || !call.arguments.lists.is_empty() {
+            return false;
+        }
+        let beside = self.beside(call.spot);
+        let to = if matches!(known, ReturnedValue::Results) { call.value } else { beside };
+        let (_, returned) = self.call_with_arguments(call.spot, &call.arguments, to, positions);
+        match known {
+            ReturnedValue::Results | ReturnedValue::Data => {}
+            ReturnedValue::Result => self.copy(returned, call.value),
+            ReturnedValue::Second => {
+                if let Some(list) = call.argument(1) {
+                    self.copy(list, call.value);
+                }
+            }
+            ReturnedValue::ElementOfSecond => {
+                if let Some(list) = call.argument(1) {
+                    self.watch(list, FlowWatcher::Contents(call.value));
+                }
+            }
+        }
+        true
+    }
+
+    /// Stores arguments in others.
+    fn change(&mut self, call: &LibraryCall<'_>) {
+        let given: Vec<CellId> = call.arguments.given.iter().map(|(cell, _)| *cell).collect();
+        let last = given.len().saturating_sub(1);
+        if call.name == "NCONC" {
+            let inside = self.beside(call.spot);
+            for list in &given {
+                self.watch(*list, FlowWatcher::Contents(inside));
+                self.watch(*list, FlowWatcher::Store(inside));
+            }
+        }
+        match STORING.iter().find(|(names, _)| names.contains(&call.name)) {
+            Some((_, pairs)) => {
+                for (what, into) in *pairs {
+                    let (from, into) = match what {
+                        StoredThing::Argument(index) => (given.get(*index).copied(), *into),
+                        StoredThing::Last => (given.last().copied(), *into),
+                        StoredThing::Contents(index) => {
+                            let inside = self.beside(call.spot);
+                            if let Some(from) = given.get(*index) {
+                                self.watch(*from, FlowWatcher::Contents(inside));
+                            }
+                            (Some(inside), *into)
+                        }
+                    };
+                    if let (Some(from), Some(into)) = (from, given.get(into.min(last))) {
+                        self.watch(*into, FlowWatcher::Store(from));
+                    }
+                }
+            }
+            None => {
+                for from in &given {
+                    for to in &given {
+                        self.watch(*to, FlowWatcher::Store(*from));
+                    }
+                }
+            }
+        }
+        if gives_data(call.builtin) {
+            for from in &given {
+                self.watch(*from, FlowWatcher::Parts);
+            }
+        } else {
+            self.return_parts(call);
+        }
     }
 
     fn any_list(&mut self, call: &LibraryCall<'_>) {
@@ -311,9 +487,9 @@ fn is_path(name: &str) -> bool {
 }
 
 /// Whether a function changes its arguments.
-fn changes_arguments(name: &str) -> bool {
-    let symbols = [esl_bytecode::symbol::Symbol::esl(name), esl_bytecode::symbol::Symbol::cl(name)];
-    let of_table = symbols.iter().find_map(Builtin::named).is_some_and(|builtin| {
+fn changes_arguments(call: &LibraryCall<'_>) -> bool {
+    let name = call.name;
+    let of_table = call.builtin.is_some_and(|builtin| {
         matches!(builtin.info().shares, Shares::Pairs | Shares::Elements | Shares::Tables | Shares::Slots)
     });
     of_table

@@ -14,6 +14,7 @@ impl ValueFlow<'_> {
     pub(super) fn call_of_form(&mut self, call: &LibraryCall<'_>) -> bool {
         let spot = call.spot;
         match call.name {
+            "FUNCALL" | "APPLY" => self.call_first(call),
             "%FAIL-FOR" => {
                 self.note_failure_arguments(&call.arguments);
                 self.fail_by_argument(call);
@@ -161,6 +162,23 @@ impl ValueFlow<'_> {
         }
     }
 
+    /// Calls the first argument with the others, in any order: this is a call of `funcall` as a value.
+    fn call_first(&mut self, call: &LibraryCall<'_>) {
+        let Some(function) = call.argument(0) else { return };
+        let others = self.beside(call.spot);
+        let arguments = &call.arguments;
+        for (from, _) in arguments.given.iter().skip(1) {
+            self.copy(*from, others);
+            self.watch(*from, FlowWatcher::Contents(others));
+        }
+        for from in arguments.lists.iter().chain(&arguments.any) {
+            self.copy(*from, others);
+            self.watch(*from, FlowWatcher::Contents(others));
+        }
+        let arguments = CallArguments { any: vec![others], ..CallArguments::default() };
+        self.call_values(call.spot, function, arguments, Some(call.value), Passing::Through, true);
+    }
+
     /// Calls the tests of a query.
     fn call_tests(&mut self, call: &LibraryCall<'_>, index: usize) {
         if let Some(query) = call.argument(index) {
@@ -293,7 +311,8 @@ impl ValueFlow<'_> {
         let FlowValue::Symbol(name) = value else { return };
         let symbol = self.symbol(name).clone();
         let methods = self.cell(CellKey::Property(symbol, Symbol::esl("%ACHIEVE")));
-        let arguments = CallArguments { any: vec![methods], ..CallArguments::default() };
+        // The arguments are in the key, as the name is.
+        let arguments = CallArguments { any: vec![self.beside(spot)], ..CallArguments::default() };
         self.call_values(spot, methods, arguments, None, Passing::Absorbed, false);
     }
 

@@ -30,6 +30,7 @@ pub(crate) fn causes_of(name: &str) -> &'static [&'static str] {
 pub(crate) struct LibraryCall<'c> {
     pub(crate) spot: Spot,
     pub(crate) name: &'c str,
+    pub(crate) builtin: Option<Builtin>,
     /// The nodes of the arguments; empty if the function is called as a value.
     pub(crate) nodes: &'c [NodeId],
     pub(crate) arguments: CallArguments,
@@ -54,7 +55,7 @@ impl ValueFlow<'_> {
         value: CellId,
     ) {
         let builtin = Builtin::named(symbol);
-        let call = LibraryCall { spot, name: symbol.name(), nodes, arguments, value };
+        let call = LibraryCall { spot, name: symbol.name(), builtin, nodes, arguments, value };
         if self.forms.generic.contains(symbol) {
             let methods = self.cell(CellKey::Methods(symbol.clone()));
             let any = call.arguments.given.iter().map(|(cell, _)| *cell).collect();
@@ -89,7 +90,9 @@ impl ValueFlow<'_> {
                 true => Some(vec![1]),
                 false => self.called_positions(&call, row.takes_functions),
             };
-            self.call_arguments(spot, &call.arguments, value, positions.as_deref());
+            if !self.call_for_known_value(&call, positions.as_deref()) {
+                self.call_arguments(spot, &call.arguments, value, positions.as_deref());
+            }
             if rows::is_of_streams(call.name) {
                 let given = call.arguments.given.into_iter().skip(usize::from(prints));
                 for (cell, _) in given {
