@@ -46,23 +46,7 @@ impl ValueFlow<'_> {
         arguments: CallArguments,
         value: CellId,
     ) {
-        let is_scripted = self.forms.scripted.contains(symbol);
-        if is_scripted {
-            let name = self.name(symbol);
-            let work = self.work(WorkKey::Scripted(name), TaskKind::Mock);
-            self.works[work.index()].is_awaited = true;
-            let answers = self.cell(CellKey::Answers(symbol.clone()));
-            self.call_values(
-                spot,
-                answers,
-                CallArguments::default(),
-                Some(value),
-                Passing::Task(work),
-                false,
-            );
-            self.note(spot, NodeEffect::Start(work));
-            self.note(spot, NodeEffect::FailAs(work));
-        }
+        let is_scripted = self.call_scripted(spot, symbol, value);
         if self.forms.defined.contains_key(symbol) {
             let function = self.cell(CellKey::Function(symbol.clone()));
             self.call_values(spot, function, arguments, Some(value), Passing::Through, false);
@@ -73,6 +57,22 @@ impl ValueFlow<'_> {
             self.fail_as_declared(spot, symbol);
             self.call_arguments(spot, &arguments, value, None);
         }
+    }
+
+    /// Calls a function that scripts of worlds answer. Returns whether it is one.
+    fn call_scripted(&mut self, spot: Spot, symbol: &Symbol, value: CellId) -> bool {
+        let is_scripted = self.forms.scripted.contains(symbol);
+        if is_scripted {
+            let name = self.name(symbol);
+            let work = self.work(WorkKey::Scripted(name), TaskKind::Mock);
+            self.works[work.index()].is_awaited = true;
+            let answers = self.cell(CellKey::Answers(symbol.clone()));
+            let arguments = CallArguments::default();
+            self.call_values(spot, answers, arguments, Some(value), Passing::Task(work), false);
+            self.note(spot, NodeEffect::Start(work));
+            self.note(spot, NodeEffect::FailAs(work));
+        }
+        is_scripted
     }
 
     /// Fails as a function declares, or in an unknown way.
@@ -108,6 +108,9 @@ impl ValueFlow<'_> {
             FlowValue::Closure(code) => self.call_closure(point, code),
             FlowValue::Function(name) => self.call_by_name(point, name),
             FlowValue::Symbol(name) if point.symbols => self.call_by_name(point, name),
+            FlowValue::AnySymbol if point.symbols && point.passing == Passing::Through => {
+                self.note(point.spot, NodeEffect::Fail(FailureKind::Any(Reason::Code)));
+            }
             FlowValue::HowToStart => {
                 if let Some((begin, _)) = point.arguments.given.get(1).cloned() {
                     let (spot, result) = (point.spot, point.result);
@@ -123,6 +126,10 @@ impl ValueFlow<'_> {
 
     fn call_by_name(&mut self, point: &CallPoint, name: NameId) {
         let symbol = self.symbol(name).clone();
+        if point.passing == Passing::Through {
+            let value = point.result.unwrap_or_else(|| self.at(point.spot));
+            self.call_scripted(point.spot, &symbol, value);
+        }
         if self.forms.defined.contains_key(&symbol) {
             let function = self.cell(CellKey::Function(symbol));
             self.call_at(function, CallPoint { symbols: false, ..point.clone() });

@@ -1,5 +1,6 @@
 //! Constraints of the nodes of the core language.
 
+use esl_bytecode::builtin::Builtin;
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::{BoundVariable, Callee, NodeId, NodeKind, Parameter};
 
@@ -7,7 +8,7 @@ use crate::cause::mistakes_named;
 use crate::clause::Clause;
 use crate::effect::{NodeEffect, mistake};
 use crate::flow::{CallArguments, CallPoint, FlowWatcher, Passing, ValueFlow};
-use crate::forms::symbols_inside;
+use crate::forms::{CoreForm, symbols_inside};
 use crate::value::{CellId, CellKey, Code, FlowValue, NO_CONTEXT, Spot, ThingKey};
 
 /// A piece of code that is being looked at.
@@ -94,8 +95,10 @@ impl ValueFlow<'_> {
                 self.join(here, *from, value);
             }
             NodeKind::Special(symbol) => {
-                let from = self.cell(CellKey::Special(symbol.clone()));
-                self.copy(from, value);
+                for key in [CellKey::Special(symbol.clone()), CellKey::AnySpecial] {
+                    let from = self.cell(key);
+                    self.copy(from, value);
+                }
                 self.note(spot, NodeEffect::Mistake(mistake::NAME));
             }
             NodeKind::SetSpecial(symbol, from) => {
@@ -177,7 +180,18 @@ impl ValueFlow<'_> {
             | NodeKind::FirstValues(body, _) => {
                 self.join(here, *body, value);
             }
-            NodeKind::Progv(_, _, body) => self.join(here, *body, value),
+            NodeKind::Progv(symbols, values, body) => {
+                let values = self.at(here.spot(*values));
+                let keys = match symbols_of(form, *symbols) {
+                    Some(symbols) => symbols.into_iter().map(CellKey::Special).collect(),
+                    None => vec![CellKey::AnySpecial],
+                };
+                for key in keys {
+                    let to = self.cell(key);
+                    self.watch(values, FlowWatcher::Contents(to));
+                }
+                self.join(here, *body, value);
+            }
             NodeKind::Call(callee, arguments) => self.call(here, spot, callee, arguments, false),
             NodeKind::Apply(callee, arguments) => self.call(here, spot, callee, arguments, true),
             NodeKind::BindValues(variables, from, body) => {
@@ -234,14 +248,18 @@ impl ValueFlow<'_> {
                 }
             }
             NodeKind::Slot(class, number, _) => {
-                let from = self.cell(CellKey::Slot(forms.base_class(class).clone(), *number));
-                self.copy(from, value);
+                for key in [CellKey::Slot(forms.base_class(class).clone(), *number), CellKey::SetByName] {
+                    let from = self.cell(key);
+                    self.copy(from, value);
+                }
                 self.note(spot, NodeEffect::Mistake(mistake::TYPE));
             }
             NodeKind::SetSlot(class, number, _, from) => {
                 let to = self.cell(CellKey::Slot(forms.base_class(class).clone(), *number));
-                self.join(here, *from, to);
-                self.join(here, *from, value);
+                let by_name = self.cell(CellKey::SlotsByName);
+                for to in [to, by_name, value] {
+                    self.join(here, *from, to);
+                }
                 self.note(spot, NodeEffect::Mistake(mistake::TYPE));
             }
         }
@@ -343,5 +361,16 @@ impl ValueFlow<'_> {
     fn make_cell(&mut self, spot: Spot) -> CellId {
         let thing = self.thing(ThingKey::Made(spot, u8::MAX));
         self.cell(CellKey::Contents(thing))
+    }
+}
+
+/// Returns the symbols in a constant list, or in a list of constants; `None` if it is another list.
+fn symbols_of(form: &CoreForm, node: NodeId) -> Option<Vec<Symbol>> {
+    match form.kind(node) {
+        NodeKind::Constant(datum) => Some(symbols_inside(datum)),
+        NodeKind::Call(Callee::Builtin(Builtin::List), items) => {
+            items.iter().map(|item| form.symbol(*item).cloned()).collect()
+        }
+        _ => None,
     }
 }

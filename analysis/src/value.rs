@@ -124,6 +124,20 @@ pub(crate) enum CellKey {
     Answers(Symbol),
     /// The slots of all instances of classes.
     Instances,
+    /// The slots of all structures, for functions that find them by their names.
+    SlotsByName,
+    /// Values for slots of structures, by functions that find these by their names.
+    SetByName,
+    /// Values of special variables that are found when the program runs.
+    AnySpecial,
+    /// Properties that are set all together.
+    PropertyLists,
+    /// Tests in the bodies of rules.
+    Rules,
+    /// Arguments of signals, of inputs and of reports of progress.
+    Signals,
+    /// Tests and hash functions of tables.
+    TableFunctions,
     /// Values that are thrown.
     Thrown,
     /// Facts.

@@ -70,7 +70,6 @@ const WITHOUT_PARTS: &[&str] = &[
     "NOW",
     "%ASSERT",
     "%RETRACT",
-    "SIGNAL",
     "HASH-TABLE-COUNT",
     "RANDOM",
     "ROUND",
@@ -93,12 +92,10 @@ const WITHOUT_PARTS: &[&str] = &[
     "STRING-LEFT-TRIM",
     "STRING-RIGHT-TRIM",
     "PARSE-INTEGER",
-    "TYPEP",
     "SYMBOL-NAME",
     "%PROCLAIM-SPECIAL",
     "BOUNDP",
     "FBOUNDP",
-    "CONCATENATE",
     "%STRING-CONCAT",
 ];
 
@@ -209,6 +206,7 @@ impl ValueFlow<'_> {
                 self.make_list(call)
             }
             "GETHASH" => {
+                self.call_table_functions(call);
                 if let Some(table) = call.argument(1) {
                     self.watch(table, FlowWatcher::Contents(call.value));
                 }
@@ -218,16 +216,6 @@ impl ValueFlow<'_> {
                 self.any_list(call);
             }
             "%PUT" => self.put(call),
-            "GET" => match (self.quoted(call, 0), self.quoted(call, 1)) {
-                (Some(symbol), Some(indicator)) => {
-                    let from = self.cell(CellKey::Property(symbol, indicator));
-                    self.copy(from, call.value);
-                }
-                _ => {
-                    let from = self.cell(CellKey::Instances);
-                    self.copy(from, call.value);
-                }
-            },
             "SET" | "%SET-CONSTANT" => {
                 if let (Some(symbol), Some(from)) = (self.quoted(call, 0), call.argument(1)) {
                     let to = self.cell(CellKey::Special(symbol));
@@ -241,17 +229,6 @@ impl ValueFlow<'_> {
                 }
             }
             "%MAKE-STRUCTURE" | "%MAKE-VALUE-STRUCTURE" => self.make_structure(call),
-            "%SLOT-VALUE" | "SLOT-VALUE" | "%CONDITION-SLOT" => {
-                let from = self.cell(CellKey::Instances);
-                self.copy(from, call.value);
-            }
-            "%SET-SLOT-VALUE" | "(SETF SLOT-VALUE)" | "%SET-CONDITION-SLOT" => {
-                let to = self.cell(CellKey::Instances);
-                for (from, _) in &call.arguments.given {
-                    self.copy(*from, to);
-                    self.copy(*from, call.value);
-                }
-            }
             "INTERN" | "FIND-SYMBOL" | "MAKE-SYMBOL" => self.add(call.value, FlowValue::AnySymbol),
             "READ" | "READ-FROM-STRING" | "SYMBOL-FUNCTION" | "FDEFINITION" => {
                 if let Some(named) = self.quoted_function(call, 0) {
@@ -284,6 +261,10 @@ impl ValueFlow<'_> {
                 }
             }
             "MAKE-HASH-TABLE" | "MAKE-ARRAY" | "MAKE-LIST" => {
+                if call.name == "MAKE-HASH-TABLE" {
+                    let functions = self.cell(CellKey::TableFunctions);
+                    self.store_all(call, functions);
+                }
                 let contents = self.make(call.spot, 0, call.value);
                 for (from, _) in &call.arguments.given {
                     self.copy(*from, contents);
@@ -356,6 +337,9 @@ impl ValueFlow<'_> {
 
     /// Stores arguments in others.
     fn change(&mut self, call: &LibraryCall<'_>) {
+        if matches!(call.name, "REMHASH" | "%PUTHASH" | "%ADD-TO-VALUE") {
+            self.call_table_functions(call);
+        }
         let given: Vec<CellId> = call.arguments.given.iter().map(|(cell, _)| *cell).collect();
         let last = given.len().saturating_sub(1);
         if call.name == "NCONC" {
@@ -454,8 +438,10 @@ impl ValueFlow<'_> {
         }
         let class = self.forms.base_class(&class).clone();
         for (index, (from, _)) in call.arguments.given.iter().enumerate().skip(1) {
-            let to = self.cell(CellKey::Slot(class.clone(), index as u16 - 1));
-            self.copy(*from, to);
+            for key in [CellKey::Slot(class.clone(), index as u16 - 1), CellKey::SlotsByName] {
+                let to = self.cell(key);
+                self.copy(*from, to);
+            }
         }
     }
 

@@ -7,7 +7,7 @@ use super::LibraryCall;
 use crate::clause::can_end;
 use crate::effect::{FailureKind, NodeEffect, Reason, mistake};
 use crate::flow::{CallArguments, FlowWatcher, Passing, ValueFlow};
-use crate::value::{CellKey, FlowValue, Spot};
+use crate::value::{CellId, CellKey, FlowValue, Spot, ThingKey};
 
 impl ValueFlow<'_> {
     /// Looks at a call of a function of forms. Returns whether it is one.
@@ -40,22 +40,25 @@ impl ValueFlow<'_> {
             "%CHECK-FAILED" | "%NO-CASE" | "%NO-CORRECT-CASE" => {
                 self.note(spot, NodeEffect::Mistake(mistake::TYPE))
             }
-            "%MAKE-SIGNALLED" | "MAKE-CONDITION" => match self.quoted(call, 0) {
-                Some(class) => {
-                    let name = self.name(&class);
-                    self.add(call.value, FlowValue::Condition(name));
-                }
-                None if self.is_text(call, 0) => {
-                    let kind = self.quoted(call, 2).unwrap_or_else(|| Symbol::cl("SIMPLE-ERROR"));
-                    let name = self.name(&kind);
-                    self.add(call.value, FlowValue::Condition(name));
-                }
-                None => {
-                    if let Some(from) = call.argument(0) {
-                        self.copy(from, call.value);
+            "%MAKE-SIGNALLED" | "MAKE-CONDITION" => {
+                self.make_condition(call);
+                match self.quoted(call, 0) {
+                    Some(class) => {
+                        let name = self.name(&class);
+                        self.add(call.value, FlowValue::Condition(name));
+                    }
+                    None if self.is_text(call, 0) => {
+                        let kind = self.quoted(call, 2).unwrap_or_else(|| Symbol::cl("SIMPLE-ERROR"));
+                        let name = self.name(&kind);
+                        self.add(call.value, FlowValue::Condition(name));
+                    }
+                    None => {
+                        if let Some(from) = call.argument(0) {
+                            self.copy(from, call.value);
+                        }
                     }
                 }
-            },
+            }
             "%FAILED-ASSERTION" => {
                 let name = self.name(&Symbol::cl("SIMPLE-ERROR"));
                 self.add(call.value, FlowValue::Condition(name));
@@ -95,11 +98,46 @@ impl ValueFlow<'_> {
                 if self.has_keyword(call, "TIMEOUT") {
                     self.fail(spot, "TIMEOUT");
                 }
-                if call.arguments.given.get(1).is_some_and(|(_, keyword)| keyword.is_none()) {
-                    self.call_argument(call, 1, &[]);
+                let signals = self.cell(CellKey::Signals);
+                if let Some((test, None)) = call.arguments.given.get(1).cloned() {
+                    let arguments = CallArguments { any: vec![signals], ..CallArguments::default() };
+                    self.call_values(spot, test, arguments, None, Passing::Through, true);
+                }
+                let lists: Vec<_> = call.arguments.lists.iter().chain(&call.arguments.any).copied().collect();
+                for list in lists {
+                    self.call_inside(spot, list, CallArguments::default(), Passing::Through);
                 }
                 if let Some(events) = call.argument(0) {
                     self.watch(events, FlowWatcher::Contents(call.value));
+                }
+                self.copy(signals, call.value);
+            }
+            "SIGNAL" | "REPORT-PROGRESS" => {
+                let signals = self.cell(CellKey::Signals);
+                self.store_all(call, signals);
+                // `signal` is also that of conditions.
+                if let Some(first) = call.argument(0) {
+                    self.copy(first, call.value);
+                }
+            }
+            "OPERATION-PROGRESS" => {
+                let signals = self.cell(CellKey::Signals);
+                self.copy(signals, call.value);
+            }
+            "FAILURE-ARGUMENTS" | "%FAILURE-ARGUMENTS" => {
+                let thing = self.thing(ThingKey::FailureArguments);
+                self.add(call.value, FlowValue::Thing(thing));
+            }
+            "%ADD-RULE" => {
+                let rules = self.cell(CellKey::Rules);
+                if let Some(query) = call.argument(1) {
+                    self.watch(query, FlowWatcher::AllContents(rules));
+                }
+            }
+            "%DEFINE-CONDITION" => {
+                let forms = self.cell(CellKey::Methods(Symbol::esl("%CONDITION-INITFORMS")));
+                for (from, _) in &call.arguments.given {
+                    self.watch(*from, FlowWatcher::AllContents(forms));
                 }
             }
             "NEXT-BINDINGS" => self.note(spot, NodeEffect::Jump),
@@ -132,16 +170,30 @@ impl ValueFlow<'_> {
                 }
                 self.may_time_out(call, 2);
             }
+            "FIND-RESTART" | "COMPUTE-RESTARTS" => {
+                let tests = self.cell(CellKey::Slot(Symbol::cl("RESTART"), 3));
+                let any = call.arguments.given.iter().map(|(cell, _)| *cell).collect();
+                let arguments = CallArguments { any, ..CallArguments::default() };
+                self.call_values(spot, tests, arguments, None, Passing::Through, true);
+                self.return_parts(call);
+            }
             "INVOKE-RESTART"
             | "INVOKE-RESTART-INTERACTIVELY"
             | "USE-VALUE"
             | "STORE-VALUE"
             | "CONTINUE"
             | "MUFFLE-WARNING" => {
-                let restarts = self.cell(CellKey::Slot(Symbol::esl("RESTART"), 1));
-                let any = call.arguments.given.iter().map(|(cell, _)| *cell).collect();
-                let arguments = CallArguments { any, ..CallArguments::default() };
-                self.call_values(spot, restarts, arguments, Some(call.value), Passing::Through, true);
+                // The function of the restart, its test and its function for arguments.
+                let chosen = self.beside(spot);
+                for slot in [1, 3, 4] {
+                    let from = self.cell(CellKey::Slot(Symbol::cl("RESTART"), slot));
+                    self.copy(from, chosen);
+                }
+                let given = call.arguments.given.iter().map(|(cell, _)| *cell);
+                let any = given.chain([call.value]).collect();
+                let lists = call.arguments.lists.iter().chain(&call.arguments.any).copied().collect();
+                let arguments = CallArguments { any, lists, ..CallArguments::default() };
+                self.call_values(spot, chosen, arguments, Some(call.value), Passing::Through, true);
                 self.note(spot, NodeEffect::Jump);
             }
             _ => return false,
@@ -179,8 +231,29 @@ impl ValueFlow<'_> {
         self.call_values(call.spot, function, arguments, Some(call.value), Passing::Through, true);
     }
 
-    /// Calls the tests of a query.
+    /// Has all arguments flow to a cell.
+    pub(super) fn store_all(&mut self, call: &LibraryCall<'_>, to: CellId) {
+        for (from, _) in &call.arguments.given {
+            self.copy(*from, to);
+        }
+        for list in call.arguments.lists.iter().chain(&call.arguments.any) {
+            self.watch(*list, FlowWatcher::Contents(to));
+        }
+    }
+
+    /// Makes a condition: its slots have the arguments, or the values of their initial forms.
+    fn make_condition(&mut self, call: &LibraryCall<'_>) {
+        let slots = self.cell(CellKey::Instances);
+        self.store_all(call, slots);
+        let forms = self.cell(CellKey::Methods(Symbol::esl("%CONDITION-INITFORMS")));
+        let arguments = CallArguments::default();
+        self.call_values(call.spot, forms, arguments, Some(slots), Passing::Through, false);
+    }
+
+    /// Calls the tests of a query, and those of rules.
     fn call_tests(&mut self, call: &LibraryCall<'_>, index: usize) {
+        let rules = self.cell(CellKey::Rules);
+        self.call_values(call.spot, rules, CallArguments::default(), None, Passing::Through, false);
         if let Some(query) = call.argument(index) {
             self.call_inside(call.spot, query, CallArguments::default(), Passing::Through);
         }
@@ -237,6 +310,7 @@ impl ValueFlow<'_> {
 
     /// Fails with the condition that an argument designates.
     fn error(&mut self, call: &LibraryCall<'_>, index: usize) {
+        self.make_condition(call);
         if self.is_text(call, index) {
             self.fail_condition(call.spot, "SIMPLE-ERROR");
         } else if let Some(class) = self.quoted(call, index) {

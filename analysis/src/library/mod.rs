@@ -1,6 +1,7 @@
 //! The functions of the library, as the analysis knows them: those that begin failures, call functions,
 //! begin tasks, store and read data. `rows` is the table of the plain ones, `forms` has the functions that
-//! the library's macros expand to, `data` those of lists, tables and slots.
+//! the library's macros expand to, `data` those of lists, tables and slots, `found` those that find
+//! functions, slots or properties when the program runs.
 //!
 //! A function of the library that none of these names may call its function arguments, returns parts of its
 //! arguments or what these functions return, and fails by programming errors only. A builtin calls no
@@ -8,6 +9,7 @@
 
 mod data;
 mod forms;
+mod found;
 mod rows;
 mod work;
 
@@ -79,10 +81,15 @@ impl ValueFlow<'_> {
         if row.mistakes != 0 {
             self.note(spot, NodeEffect::Mistake(row.mistakes));
         }
-        if self.call_of_form(&call) || self.call_of_work(&call) || self.call_of_data(&call) {
+        let is_known = self.call_of_form(&call)
+            || self.call_of_work(&call)
+            || self.call_by_found(&call)
+            || self.call_of_data(&call);
+        if is_known {
             return;
         }
-        if builtin.is_some() || data::CALLS_NO_ARGUMENT.contains(&call.name) {
+        let is_plain = builtin.is_some() && !row.takes_functions;
+        if is_plain || data::CALLS_NO_ARGUMENT.contains(&call.name) {
             self.return_parts(&call);
         } else {
             let prints = data::PRINTING.contains(&call.name);
@@ -131,6 +138,9 @@ impl ValueFlow<'_> {
 
     /// Returns whether the keyword is among the arguments, or may be.
     pub(crate) fn has_keyword(&self, call: &LibraryCall<'_>, keyword: &str) -> bool {
+        if !call.arguments.lists.is_empty() || !call.arguments.any.is_empty() {
+            return true;
+        }
         let is_it =
             |(_, name): &(CellId, Option<Symbol>)| name.as_ref().is_some_and(|name| name.name() == keyword);
         call.nodes.is_empty() || call.arguments.given.iter().any(is_it)

@@ -349,8 +349,8 @@ pub(crate) fn function_positions(name: &str) -> &'static [usize] {
         | "%SPAWN"
         | "%WAIT-UNTIL"
         | "%WAIT-UNTIL-CHANGED"
-        | "%WAIT-UNTIL-FOR"
-        | "%DERIVED-VALUE" => &[0],
+        | "%WAIT-UNTIL-FOR" => &[0],
+        "%DERIVED-VALUE" => &[1],
         _ => &[],
     }
 }

@@ -8,7 +8,7 @@ use super::LibraryCall;
 use crate::effect::NodeEffect;
 use crate::flow::{CallArguments, FlowWatcher, Passing, ValueFlow};
 use crate::forms::script_nodes;
-use crate::value::{CellId, CellKey, FlowValue, Spot, TaskKind, WorkId, WorkKey};
+use crate::value::{CellId, CellKey, FlowValue, Spot, TaskKind, ThingKey, WorkId, WorkKey};
 
 impl ValueFlow<'_> {
     /// Begins a task at a spot that runs the functions in a cell.
@@ -61,6 +61,8 @@ impl ValueFlow<'_> {
             }
             "%TASK-VALUE" => self.values_of(call),
             "WAIT-FOR-TASK" | "%TASK-END" => {
+                let thing = self.thing(ThingKey::FailureArguments);
+                self.add(call.value, FlowValue::Thing(thing));
                 if let Some(task) = call.argument(0) {
                     self.watch(task, FlowWatcher::Ends(call.value));
                 }
@@ -170,6 +172,7 @@ impl ValueFlow<'_> {
                 if let Some(generic) = call.argument(0) {
                     self.watch(generic, FlowWatcher::Methods(contents));
                 }
+                self.call_protocol(call, &["NO-APPLICABLE-METHOD"]);
             }
             "%DEFINE-CLASS" => {
                 let forms = self.cell(CellKey::Methods(Symbol::esl("%INITFORMS")));
@@ -177,12 +180,16 @@ impl ValueFlow<'_> {
                     self.watch(*from, FlowWatcher::AllContents(forms));
                 }
             }
-            "MAKE-INSTANCE" => {
+            "MAKE-INSTANCE" | "CHANGE-CLASS" | "REINITIALIZE-INSTANCE" => {
                 let to = self.cell(CellKey::Instances);
-                for (from, _) in &call.arguments.given {
-                    self.copy(*from, to);
-                }
-                for name in ["%INITFORMS", "INITIALIZE-INSTANCE", "SHARED-INITIALIZE"] {
+                self.store_all(call, to);
+                for name in [
+                    "%INITFORMS",
+                    "INITIALIZE-INSTANCE",
+                    "SHARED-INITIALIZE",
+                    "REINITIALIZE-INSTANCE",
+                    "UPDATE-INSTANCE-FOR-DIFFERENT-CLASS",
+                ] {
                     let symbol = if name.starts_with('%') { Symbol::esl(name) } else { Symbol::cl(name) };
                     let methods = self.cell(CellKey::Methods(symbol));
                     let any = call.arguments.given.iter().map(|(cell, _)| *cell).collect();

@@ -16,14 +16,18 @@ fn short(place: &CodePlace) -> String {
 
 /// Returns the origins of a row in words.
 pub(super) fn origins(row: &CauseRow) -> String {
-    let mut parts: Vec<String> = row
-        .origins
-        .iter()
-        .take(MOST_ORIGINS)
-        .map(|origin| format!("{} ({})", origin.function, short(&origin.place)))
-        .collect();
-    if row.origins.len() > MOST_ORIGINS {
-        parts.push(format!("{} more", row.origins.len() - MOST_ORIGINS));
+    let mut parts: Vec<String> = Vec::new();
+    for origin in &row.origins {
+        let part = format!("{} ({})", origin.function, short(&origin.place));
+        // Several failures may begin in one line.
+        if parts.last() != Some(&part) {
+            parts.push(part);
+        }
+    }
+    if parts.len() > MOST_ORIGINS {
+        let rest = parts.len() - MOST_ORIGINS;
+        parts.truncate(MOST_ORIGINS);
+        parts.push(format!("{rest} more"));
     }
     if row.is_mistake { "a programming error".into() } else { parts.join(", ") }
 }

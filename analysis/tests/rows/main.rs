@@ -4,6 +4,7 @@
 mod many;
 mod spent;
 mod values;
+mod ways;
 
 use esl::program::{Source, compile_with_core};
 use esl_analysis::{AnalysisOptions, CauseRow, FailureTable, analyze};
