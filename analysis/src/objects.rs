@@ -17,6 +17,8 @@ const MOST_OBJECTS: usize = 200;
 #[derive(Debug, Default)]
 pub(crate) struct JoinedObjects {
     joined: FxHashMap<ThingId, ThingId>,
+    /// Whether an object stands for others that differ.
+    pub(crate) are_mixed: bool,
 }
 
 impl JoinedObjects {
@@ -118,6 +120,7 @@ impl ValueFlow<'_> {
         let mut things: Vec<ThingId> = things.into_iter().collect();
         things.sort_unstable();
         let one = things[0];
+        self.objects.are_mixed = true;
         for other in things.drain(1..) {
             self.join_object(one, other);
         }

@@ -388,10 +388,13 @@ impl Solution {
                     })
                     .collect();
                 let fails = |work: &WorkId| !self.of_works[work.index()].failures.is_empty();
-                if flow.forms.aborts || tasks.iter().all(fails) {
+                // Tasks of other forms may be among them where values are not told apart.
+                let is_mixed = flow.objects.are_mixed || !flow.many.places.is_empty();
+                let may_all_fail = tasks.iter().all(fails) || (is_mixed && tasks.iter().any(fails));
+                if flow.forms.aborts || may_all_fail {
                     let failure = self.failure(FailureKind::Cause(cause), code.form, node);
                     leaving.failures.insert(failure);
-                } else if tasks.iter().all(|work| !self.of_works[work.index()].is_empty()) {
+                } else if is_mixed || tasks.iter().all(|work| !self.of_works[work.index()].is_empty()) {
                     leaving.mistakes = mistake::CONSEQUENCE;
                 }
             }
