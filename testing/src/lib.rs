@@ -33,6 +33,7 @@ use esl::Error;
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Program};
 use esl_bytecode::datum::Datum;
+use esl_bytecode::module::Constant;
 use esl_host::{Captured, Host, RealHost, Rights, VirtualHost};
 use esl_vm::explore::{Exploration, Grain, Settings, TimerGrain, UnmetCondition};
 use esl_vm::task::TaskId;
@@ -179,6 +180,13 @@ pub fn list(program: &Program, setup: &Setup) -> Result<Vec<Test>, Error> {
         _ => None,
     };
     Ok(tests.as_list().unwrap_or_default().iter().filter_map(read).collect())
+}
+
+/// Whether a program may define tests: without, there is no need to run it for their list.
+pub fn may_define_tests(program: &Program) -> bool {
+    let module = program.module();
+    let defines = |constant: &Constant| matches!(constant, Constant::Symbol(symbol) if ["%DEFINE-TEST", "LOAD", "EVAL"].contains(&symbol.name()));
+    !module.requires.is_empty() || module.constants.iter().any(defines)
 }
 
 /// Returns how a test is explored, as the library has noted it.

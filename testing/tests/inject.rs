@@ -3,7 +3,7 @@
 use esl::program::{Source, compile};
 use esl_bytecode::symbol::Symbol;
 use esl_testing::inject::{InjectSettings, InjectionSubject, KnownFailures, inject};
-use esl_testing::{Setup, list};
+use esl_testing::{Setup, list, may_define_tests};
 
 /// The rows of the tests of a program, or of the program itself, as `name: outcome`.
 fn rows(text: &str, settings: &InjectSettings, known: &[(&str, &str)]) -> Vec<String> {
@@ -138,6 +138,29 @@ fn an_undisturbed_run_that_fails_is_no_measure() {
         inject(&subject, &KnownFailures::new(), &InjectSettings::default(), &|_, _| ()).expect("it begins");
     assert_eq!(report.problem.as_deref(), Some("A failure of cause :DARK."));
     assert!(report.rows.is_empty());
+}
+
+#[test]
+fn a_run_without_an_end_is_no_measure() {
+    let text = "(define-mock look () 1) (loop (look) (sleep 1))";
+    let program = compile(&[Source::new("endless.esl", text)]).program.expect("it compiles");
+    assert!(!may_define_tests(&program));
+    let subject = InjectionSubject { program: &program, test: None, seed: 0, setup: &Setup::default() };
+    let settings = InjectSettings { patience: 0.1, ..InjectSettings::default() };
+    let report = inject(&subject, &KnownFailures::new(), &settings, &|_, _| ()).expect("it begins");
+    let problem = report.problem.expect("it is told");
+    assert!(problem.starts_with("it has not ended after"), "{problem}");
+}
+
+#[test]
+fn programs_that_may_define_tests_are_known() {
+    let may = |text: &str| {
+        let program = compile(&[Source::new("a.esl", text)]).program.expect("it compiles");
+        may_define_tests(&program)
+    };
+    assert!(may("(deftest a (is t))"));
+    assert!(may("(load \"tests.esl\")"));
+    assert!(!may("(print 1)"));
 }
 
 #[test]

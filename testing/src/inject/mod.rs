@@ -73,7 +73,8 @@ pub struct InjectionSubject<'a> {
 pub struct InjectSettings {
     /// Most calls of an operation that are disturbed: the first, the last, and others evenly between.
     pub calls: usize,
-    /// Factor by which a run may take longer than the undisturbed one; see [`RunBound`].
+    /// Factor by which a run may take longer than the undisturbed one; see [`RunBound`]. The undisturbed one may
+    /// take a million ticks and a million virtual seconds for each unit.
     pub patience: f64,
     /// Most pairs of faults that are injected together; 0 for none.
     pub pairs: usize,
@@ -101,8 +102,15 @@ pub struct RunBound {
 }
 
 impl RunBound {
-    /// Bound of an undisturbed run: four months of virtual time.
-    const UNDISTURBED: RunBound = RunBound { seconds: 1e7, ticks: 50_000_000 };
+    /// Bound of an undisturbed run, for each unit of patience: with ten, four months of virtual time.
+    const UNDISTURBED: RunBound = RunBound { seconds: 1e6, ticks: 1_000_000 };
+
+    fn of_undisturbed(factor: f64) -> RunBound {
+        RunBound {
+            seconds: RunBound::UNDISTURBED.seconds * factor,
+            ticks: (RunBound::UNDISTURBED.ticks as f64 * factor) as u64,
+        }
+    }
 
     fn new(undisturbed: &InjectedRun, factor: f64) -> RunBound {
         RunBound {
@@ -165,7 +173,8 @@ pub fn inject(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<InjectionReport, Error> {
     let is_test = subject.test.is_some();
-    let undisturbed = Runs::new(subject, subject.seed).run(&[], RunBound::UNDISTURBED, true)?;
+    let longest = RunBound::of_undisturbed(settings.patience);
+    let undisturbed = Runs::new(subject, subject.seed).run(&[], longest, true)?;
     let bound = RunBound::new(&undisturbed, settings.patience);
     let mut report = InjectionReport {
         test: subject.test.map(String::from),

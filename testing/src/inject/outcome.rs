@@ -128,7 +128,10 @@ pub(super) fn problem(run: &InjectedRun, is_test: bool) -> Option<String> {
         return Some(run.violated.join("; "));
     }
     if run.is_endless {
-        return Some(format!("it has not ended after {:.0} s and {} ticks", run.seconds, run.ticks));
+        return Some(format!(
+            "it has not ended after {:.0} s and {} ticks; a run of a program that never ends has no end to compare",
+            run.seconds, run.ticks
+        ));
     }
     match run.ended {
         Ended::Normally(status) if status == wanted => None,

@@ -24,7 +24,7 @@ pub(crate) struct InjectArguments {
     #[arg(requires = "inject")]
     pub(crate) calls: u32,
     /// Factor by which a disturbed run may take longer than the undisturbed one, in addition to an hour of
-    /// virtual time; one that takes longer hangs
+    /// virtual time; one that takes longer hangs. The undisturbed one may take a million ticks for each unit
     #[arg(long, value_name = "FACTOR", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) patience: u32,
     /// Form of the table

@@ -12,7 +12,7 @@ use esl_compiler::diagnostic::{Format, Renderer};
 use esl_testing::inject::{
     InjectFormat, InjectSettings, InjectionReport, InjectionSubject, KnownFailures, inject, render, summary,
 };
-use esl_testing::{Setup, list};
+use esl_testing::{Setup, list, may_define_tests};
 
 use super::{Options, TestFiles, is_wanted};
 
@@ -110,8 +110,11 @@ impl LoadedFile {
             complain(format_args!("{} cannot be run: {error}", self.name));
             FAILED
         };
-        // A program without tests need not come to its end within this.
-        let tests = list(&self.program, &self.setup).unwrap_or_default();
+        // A program without tests need not come to its end.
+        let tests = match may_define_tests(&self.program) {
+            true => list(&self.program, &self.setup).unwrap_or_default(),
+            false => Vec::new(),
+        };
         let names: Vec<Option<&str>> = if tests.is_empty() {
             vec![None]
         } else {
