@@ -405,6 +405,8 @@ impl<'a> ValueFlow<'a> {
                     self.copy(from, first);
                 }
             }
+            // Most values are objects, which cannot be called.
+            FlowWatcher::Call(_) if matches!(value, FlowValue::Thing(_)) => {}
             FlowWatcher::Call(id) => {
                 let point = self.points.keys[id.index()].clone();
                 self.call_value(id, &point, value);

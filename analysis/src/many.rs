@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 
 use esl_compiler::core::NodeId;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::effect::{NodeEffect, mistake};
 use crate::flow::{CallArguments, CallPoint, FlowWatcher, Passing, ValueFlow};
@@ -25,6 +25,8 @@ pub(crate) struct ManyCalls {
     pub(crate) places: BTreeSet<(u32, NodeId)>,
     known: FxHashSet<Code>,
     points: FxHashSet<PointId>,
+    /// Number of values of cells, and of the functions among them, when these were last counted.
+    counted: FxHashMap<CellId, (usize, usize)>,
 }
 
 impl ValueFlow<'_> {
@@ -39,32 +41,52 @@ impl ValueFlow<'_> {
 
     /// Whether a value is a function of the program that a call at this point may call.
     fn is_called(&self, point: &CallPoint, value: FlowValue) -> bool {
+        point.passing == Passing::Through && self.is_function(value, point.symbols)
+    }
+
+    /// Whether a value is a function of the program, or with `symbols` the name of one.
+    fn is_function(&self, value: FlowValue, symbols: bool) -> bool {
         let is_defined = |name| self.forms.defined.contains_key(self.symbol(name));
-        point.passing == Passing::Through
-            && match value {
-                FlowValue::Closure(_) => true,
-                FlowValue::Function(name) => is_defined(name),
-                FlowValue::Symbol(name) => point.symbols && is_defined(name),
-                _ => false,
-            }
+        match value {
+            FlowValue::Closure(_) => true,
+            FlowValue::Function(name) => is_defined(name),
+            FlowValue::Symbol(name) => symbols && is_defined(name),
+            _ => false,
+        }
     }
 
     /// Has calls of the values of a cell be among the places if too many functions are in it.
     pub(crate) fn crowd(&mut self, cell: CellId, watchers: &[FlowWatcher]) {
-        if self.cells.values(cell).len() <= MOST_FUNCTIONS {
+        let count = self.cells.values(cell).len();
+        if count <= MOST_FUNCTIONS {
             return;
         }
-        let mut values = None;
+        let is_apart = |watcher: &FlowWatcher| match watcher {
+            FlowWatcher::Call(id) => !self.many.points.contains(id),
+            _ => false,
+        };
+        if !watchers.iter().any(is_apart) {
+            return;
+        }
+        // Since the functions were counted, each new value may be one more.
+        if let Some((before, functions)) = self.many.counted.get(&cell)
+            && functions + count.saturating_sub(*before) <= MOST_FUNCTIONS
+        {
+            return;
+        }
+        let mut by_symbols = 0;
+        let mut functions = 0;
+        for number in self.cells.values(cell).iter() {
+            let value = self.values.keys[number as usize];
+            functions += usize::from(self.is_function(value, false));
+            by_symbols += usize::from(self.is_function(value, true));
+        }
+        self.many.counted.insert(cell, (count, by_symbols));
         for watcher in watchers {
             let FlowWatcher::Call(id) = watcher else { continue };
             let point = self.points.keys[id.index()].clone();
-            if self.many.points.contains(id) {
-                continue;
-            }
-            let values = values.get_or_insert_with(|| self.values_in(self.cells.values(cell)));
-            let called = values.iter().filter(|value| self.is_called(&point, **value));
-            if called.count() > MOST_FUNCTIONS {
-                self.many.points.insert(*id);
+            let called = if point.symbols { by_symbols } else { functions };
+            if point.passing == Passing::Through && called > MOST_FUNCTIONS && self.many.points.insert(*id) {
                 self.call_many(&point);
             }
         }
