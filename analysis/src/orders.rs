@@ -50,7 +50,7 @@ struct OrderStep {
 }
 
 /// Code to be looked at, with the resources held there.
-struct PendingCode {
+struct HoldingCode {
     code: Code,
     taker: Taker,
     held: HeldResources,
@@ -62,7 +62,7 @@ struct OrderWalk<'w, 'a> {
     bodies: Vec<Vec<Code>>,
     /// Resources of which there is one, by name.
     single: Vec<Symbol>,
-    pending: VecDeque<PendingCode>,
+    pending: VecDeque<HoldingCode>,
     seen: FxHashSet<(Code, Taker, Vec<ResourceNumber>)>,
     steps: BTreeSet<OrderStep>,
     spans: FxHashMap<(u32, usize, usize), Span>,
@@ -138,7 +138,7 @@ impl OrderWalk<'_, '_> {
     fn enter(&mut self, code: Code, taker: Taker, held: &HeldResources) {
         let names = held.keys().copied().collect();
         if self.seen.len() < MOST_STATES && self.seen.insert((code, taker, names)) {
-            self.pending.push_back(PendingCode { code, taker, held: held.clone() });
+            self.pending.push_back(HoldingCode { code, taker, held: held.clone() });
         }
     }
 
@@ -150,7 +150,7 @@ impl OrderWalk<'_, '_> {
         }
     }
 
-    fn look_at(&mut self, next: &PendingCode) {
+    fn look_at(&mut self, next: &HoldingCode) {
         let flow = self.flow;
         let form = &flow.forms.forms[next.code.form as usize];
         let Some(number) = flow.number_of(next.code) else { return };
@@ -232,7 +232,7 @@ impl OrderWalk<'_, '_> {
     /// Notes that a task takes resources at a node, and adds them to those that it holds.
     fn take(
         &mut self,
-        next: &PendingCode,
+        next: &HoldingCode,
         form: &CoreForm,
         node: NodeId,
         request: &ResourceRequest,

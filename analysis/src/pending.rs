@@ -1,7 +1,8 @@
 //! The code and the tasks that the fixed point of effects looks at next.
 //!
-//! A round looks at code from the last found to the first, so that mostly functions come before their callers, then at
-//! tasks. Code is looked at again only if the failures of code, tasks or forms that it depends on have changed.
+//! A round looks at code from the last found to the first, so that mostly functions come before their
+//! callers, then at tasks. Code is looked at again only if the failures of code, tasks or forms that it
+//! depends on have changed.
 
 use std::collections::BTreeSet;
 

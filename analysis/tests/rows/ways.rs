@@ -1,5 +1,5 @@
-//! Ways of functions and causes to a call: through events, conditions, restarts, tables, slots, functions that
-//! share their arguments, methods of protocols.
+//! Ways of functions and causes to a call: through events, conditions, restarts, tables, slots, functions
+//! that share their arguments, methods of protocols.
 
 use super::table;
 

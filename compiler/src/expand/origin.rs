@@ -41,8 +41,8 @@ pub(super) struct Origin {
     chain: u32,
 }
 
-/// The form of a macro call, whose symbols are looked for one after the other: it is read once, as far as that
-/// takes.
+/// The form of a macro call, whose symbols are looked for one after the other: it is read once, as far as
+/// that takes.
 #[derive(Debug, Default)]
 struct WrittenForm {
     /// Parts that have not been read, the next one last.
