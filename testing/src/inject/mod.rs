@@ -73,8 +73,8 @@ pub struct InjectionSubject<'a> {
 pub struct InjectSettings {
     /// Most calls of an operation that are disturbed: the first, the last, and others evenly between.
     pub calls: usize,
-    /// Factor by which a run may take longer than the undisturbed one; see [`RunBound`]. The undisturbed one may
-    /// take a million ticks and a million virtual seconds for each unit.
+    /// Factor by which a run may take longer than the undisturbed one; see [`RunBound`]. The undisturbed
+    /// one may take a million ticks and a million virtual seconds for each unit.
     pub patience: f64,
     /// Most pairs of faults that are injected together; 0 for none.
     pub pairs: usize,

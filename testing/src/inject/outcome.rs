@@ -129,7 +129,7 @@ pub(super) fn problem(run: &InjectedRun, is_test: bool) -> Option<String> {
     }
     if run.is_endless {
         return Some(format!(
-            "it has not ended after {:.0} s and {} ticks; a run of a program that never ends has no end to compare",
+            "it has not ended after {:.0} s and {} ticks; without its end there is nothing to compare",
             run.seconds, run.ticks
         ));
     }
