@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::symbol::Symbol;
-use esl_compiler::core::NodeId;
+use esl_compiler::core::{Callee, NodeId, NodeKind};
 use esl_compiler::diagnostic::Sources;
 
 use crate::cause::{Applies, clause_applies, is_above_cause, is_of_mistake, shown_cause};
-use crate::forms::{CoreForms, DeclaredCauses};
+use crate::forms::{CoreForm, CoreForms, DeclaredCauses, is_esl, symbols_inside};
 use crate::guard::LeavingFailures;
 use crate::is_of_program;
 use crate::row::{CodePlace, FailingTask, FailureTable};
@@ -58,12 +58,47 @@ pub(crate) fn declared(forms: &CoreForms) -> BTreeMap<String, Vec<Symbol>> {
     forms.declared.iter().map(row).collect()
 }
 
+/// Whether a name that has a declaration stands anywhere else in the program, or is one of the language.
+fn is_mentioned(forms: &CoreForms, name: &Symbol) -> bool {
+    let is_known = forms.defined.contains_key(name)
+        || forms.generic.contains(name)
+        || forms.exclusive.contains(name)
+        || forms.scripted.contains(name);
+    is_known
+        || name.is_in("COMMON-LISP")
+        || name.is_in("ESL")
+        || forms.forms.iter().any(|form| mentions(form, name))
+}
+
+/// Whether a name stands anywhere in a form, but as that of a declaration of failures.
+fn mentions(form: &CoreForm, name: &Symbol) -> bool {
+    let calls = form.core.nodes.iter().filter_map(|node| match &node.kind {
+        NodeKind::Call(_, arguments) => Some(arguments.as_slice()),
+        _ => None,
+    });
+    let is_fails =
+        |node: &NodeId| matches!(form.kind(*node), NodeKind::Constant(key) if is_esl(key, "%FAILS"));
+    let declared: Vec<NodeId> = calls
+        .filter(|arguments| arguments.get(1).is_some_and(is_fails))
+        .filter_map(|arguments| arguments.first().copied())
+        .collect();
+    form.core.nodes.iter().enumerate().any(|(number, node)| match &node.kind {
+        NodeKind::Call(Callee::Global(symbol), _)
+        | NodeKind::Apply(Callee::Global(symbol), _)
+        | NodeKind::FunctionRef(symbol) => symbol == name,
+        NodeKind::Constant(datum) => {
+            !declared.contains(&NodeId(number as u32)) && symbols_inside(datum).contains(name)
+        }
+        _ => false,
+    })
+}
+
 /// Returns errors for the declarations of a program whose failures are not found: a promise that nothing has
 /// checked is not kept. Those that nothing ever checks, of functions of the host and of the library, are
 /// trusted here, too.
 pub(crate) fn unchecked(forms: &CoreForms, sources: &Sources) -> Vec<Diagnostic> {
     let found = |(name, declared): (&Symbol, &DeclaredCauses)| {
-        let (form, node) = declared.place;
+        let (form, node) = declared.place();
         let span = forms.forms[form].core.nodes[node.index()].span;
         let is_compared = forms.defined.contains_key(name) || name.is_keyword() || name.name() == "MAIN";
         if !is_compared || !is_of_program(sources, span) {
@@ -86,7 +121,15 @@ impl Maker<'_, '_> {
     pub(crate) fn findings(&self) -> Vec<Diagnostic> {
         let forms = self.flow.forms;
         let mut findings = Vec::new();
-        for (name, declared) in &forms.declared {
+        for (name, DeclaredCauses { causes: declared, parts }) in &forms.declared {
+            let Some(((form, node), _)) = parts.first().cloned() else { continue };
+            let span = forms.forms[form].core.nodes[node.index()].span;
+            let shown = shown_function(name);
+            if !name.is_keyword() && name.name() != "MAIN" && !is_mentioned(forms, name) {
+                let message = format!("`{shown}` declares failures, but nothing defines or calls it");
+                findings.push(Diagnostic::new("declared-never", Severity::Warning, message, span));
+                continue;
+            }
             let leaving = match forms.defined.get(name) {
                 Some((form, node)) => self.leaving_of(*form as u32, *node),
                 None if name.name() == "MAIN" => Some(self.leaving_main()),
@@ -95,15 +138,12 @@ impl Maker<'_, '_> {
             };
             let Some(leaving) = leaving else { continue };
             let kinds = leaving.failures.iter().map(|failure| self.solution.failures.keys[*failure as usize]);
-            let (form, node) = declared.place;
-            let span = forms.forms[form].core.nodes[node.index()].span;
-            let shown = shown_function(name);
             let crowded = self.crowded_place(name);
-            let mut is_seen = vec![false; declared.causes.len()];
+            let mut is_seen = vec![false; declared.len()];
             let mut told = Vec::new();
             for failing in kinds {
                 let mut best = Applies::No;
-                for (index, cause) in declared.causes.iter().enumerate() {
+                for (index, cause) in declared.iter().enumerate() {
                     let applies = clause_applies(forms, &self.flow.names, failing.kind, cause);
                     is_seen[index] |= applies != Applies::No;
                     best = best.max(applies);
@@ -123,7 +163,7 @@ impl Maker<'_, '_> {
                     told.push(cause);
                 }
             }
-            for (cause, _) in declared.causes.iter().zip(&is_seen).filter(|(_, is_seen)| !**is_seen) {
+            for (cause, _) in declared.iter().zip(&is_seen).filter(|(_, is_seen)| !**is_seen) {
                 let cause = shown_cause(cause);
                 let message = format!("`{shown}` declares {cause}, but never fails with it");
                 findings.push(Diagnostic::new("declared-never", Severity::Warning, message, span));
@@ -139,51 +179,66 @@ impl Maker<'_, '_> {
     /// that is declared in place of a function names tasks: `:imaging` those of this name, `:tasks` all for
     /// which no form waits and that begin in the source of the declaration, the main task among them.
     pub(crate) fn unhandled(&self, tasks: &[FailingTask]) -> Vec<Diagnostic> {
-        let forms = self.flow.forms;
         let mut findings = Vec::new();
-        for (name, declared) in &forms.declared {
-            if !name.is_keyword() {
+        for (name, declared) in self.flow.forms.declared.iter().filter(|(name, _)| name.is_keyword()) {
+            if name.name() != "TASKS" {
+                self.add_unhandled(name, declared, tasks, &mut findings);
                 continue;
             }
-            let (form, node) = declared.place;
-            let span = forms.forms[form].core.nodes[node.index()].span;
-            let here = self.place(form as u32, node).source;
-            let wanted = name.name().to_lowercase();
-            let is_meant = |task: &&FailingTask| {
-                let is_own = matches!(task.kind, TaskKind::Main | TaskKind::Spawned | TaskKind::Child);
-                match &*wanted {
-                    "tasks" => {
-                        is_own
-                            && !task.is_awaited
-                            && (task.kind == TaskKind::Main || task.place.source == here)
-                    }
-                    wanted => task.name == wanted,
-                }
-            };
-            for task in tasks.iter().filter(is_meant) {
-                for row in task.causes.iter().filter(|row| !row.is_mistake) {
-                    let is_declared = |known: &Symbol| {
-                        row.name.as_ref().is_some_and(|cause| is_above_cause(forms, cause, known))
-                            || known.name() == "GENERAL-FAILURE"
-                    };
-                    if declared.causes.iter().any(is_declared) {
-                        continue;
-                    }
-                    let message =
-                        format!("no clause takes {}, which ends the task `{}`", row.cause, task.name);
-                    let mut found = Diagnostic::new("unhandled-failure", Severity::Error, message, span);
-                    found = match row.origins.first() {
-                        Some(origin) => found.also(origin.span(), "it begins here"),
-                        None => found,
-                    };
-                    findings.push(found);
-                }
+            // Declarations for all tasks are those of their source.
+            let mut of_sources: BTreeMap<String, DeclaredCauses> = BTreeMap::new();
+            for (place, causes) in &declared.parts {
+                let source = self.place(place.0 as u32, place.1).source;
+                of_sources.entry(source).or_default().add(*place, causes.clone());
             }
+            of_sources.values().for_each(|own| self.add_unhandled(name, own, tasks, &mut findings));
         }
         findings.sort_by_key(|found| {
             (found.primary.span.source, found.primary.span.start, found.message.clone())
         });
         findings
+    }
+
+    /// Adds the errors for the declarations of a keyword; those for all tasks are of one source.
+    fn add_unhandled(
+        &self,
+        name: &Symbol,
+        declared: &DeclaredCauses,
+        tasks: &[FailingTask],
+        findings: &mut Vec<Diagnostic>,
+    ) {
+        let forms = self.flow.forms;
+        let (form, node) = declared.place();
+        let span = forms.forms[form].core.nodes[node.index()].span;
+        let here = self.place(form as u32, node).source;
+        let wanted = name.name().to_lowercase();
+        let is_meant = |task: &&FailingTask| {
+            let is_own = matches!(task.kind, TaskKind::Main | TaskKind::Spawned | TaskKind::Child);
+            match &*wanted {
+                "tasks" => {
+                    is_own && !task.is_awaited && (task.kind == TaskKind::Main || task.place.source == here)
+                }
+                wanted => task.name == wanted,
+            }
+        };
+        for task in tasks.iter().filter(is_meant) {
+            for row in task.causes.iter().filter(|row| !row.is_mistake) {
+                let is_declared = |known: &Symbol| {
+                    row.name.as_ref().is_some_and(|cause| is_above_cause(forms, cause, known))
+                        || known.name() == "GENERAL-FAILURE"
+                };
+                if declared.causes.iter().any(is_declared) {
+                    continue;
+                }
+                let message = format!("no clause takes {}, which ends the task `{}`", row.cause, task.name);
+                let mut found = Diagnostic::new("unhandled-failure", Severity::Error, message, span);
+                found = match row.origins.first() {
+                    Some(origin) => found.also(origin.span(), "it begins here"),
+                    None => found,
+                };
+                findings.push(found);
+            }
+        }
     }
 
     /// Returns a place with too many functions in the code that a function, or the main task, runs.

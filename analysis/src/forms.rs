@@ -288,12 +288,26 @@ fn leaving_handlers(core: &Core, list: NodeId) -> Vec<Datum> {
     leaving.collect()
 }
 
-/// A declaration `(fails name cause*)`.
-#[derive(Clone, Debug)]
+/// The declarations `(fails name cause*)` of a name, which add up.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct DeclaredCauses {
     pub(crate) causes: Vec<Symbol>,
-    /// Form and node of the declaration.
-    pub(crate) place: (usize, NodeId),
+    /// Form and node of each declaration, with its causes.
+    pub(crate) parts: Vec<((usize, NodeId), Vec<Symbol>)>,
+}
+
+impl DeclaredCauses {
+    pub(crate) fn add(&mut self, place: (usize, NodeId), causes: Vec<Symbol>) {
+        let new = causes.iter().filter(|cause| !self.causes.contains(cause)).cloned();
+        let new: Vec<Symbol> = new.collect();
+        self.causes.extend(new);
+        self.parts.push((place, causes));
+    }
+
+    /// Returns form and node of the first declaration.
+    pub(crate) fn place(&self) -> (usize, NodeId) {
+        self.parts.first().map_or((0, NodeId(0)), |(place, _)| *place)
+    }
 }
 
 /// The forms of a program, and its definitions at fixed places.
@@ -427,7 +441,7 @@ impl CoreForms {
             }
             ("%PUT", Some(name)) if constant(1).is_some_and(|key| is_esl(&key, "%FAILS")) => {
                 let causes = constant(2).map(symbols).unwrap_or_default();
-                self.declared.insert(name, DeclaredCauses { causes, place: (index, node) });
+                self.declared.entry(name).or_default().add((index, node), causes);
             }
             _ => {}
         }

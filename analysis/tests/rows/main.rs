@@ -1,6 +1,7 @@
 //! Rows of small programs: the causes that leave functions and tasks, as the semantics of the language has
 //! it.
 
+mod declared;
 mod many;
 mod spent;
 mod values;
@@ -310,30 +311,6 @@ fn operations_fail_as_their_mocks_and_declarations() {
 }
 
 #[test]
-fn declarations_are_checked_in_both_directions() {
-    let findings = |text: &str| {
-        let found = table(text).findings;
-        found.iter().map(|found| format!("{} {}", found.code, found.message)).collect::<Vec<_>>()
-    };
-    assert!(findings("(declaim (fails f :a)) (defun f () (fail :a))").is_empty());
-    assert_eq!(
-        findings("(declaim (fails f :a)) (defun f () (fail :b))"),
-        [
-            "declared-never `f` declares :a, but never fails with it",
-            "undeclared-failure `f` may fail with :b, which it does not declare"
-        ]
-    );
-    assert_eq!(
-        findings("(declaim (fails main)) (defun f () (fail :b)) (f)"),
-        ["undeclared-failure `main` may fail with :b, which it does not declare"]
-    );
-    assert!(
-        findings("(declaim (fails main)) (defun f () (fail :b)) (ignore-errors (print (f)) (fail :c))").len()
-            == 2
-    );
-}
-
-#[test]
 fn without_a_clause_its_failures_go_outward() {
     let mission = |clauses: &str| {
         format!(
@@ -429,26 +406,6 @@ fn endless_retries_and_clauses_that_fall_off_are_found() {
 (:stuck (give-up)))
 (print (fail :stuck))))";
     check_findings(answered, &[("clause-falls-off", 5)]);
-}
-
-#[test]
-fn tasks_are_compared_with_their_declarations() {
-    let text = |declared: &str| {
-        format!(
-            "(declaim (fails {declared}))
-(define-cause :stuck ()) (define-cause :jammed (:stuck)) (define-cause :lost ())
-(spawn (:name \"look\") (sleep 1) (fail :lost))
-(spawn (:name \"drive\") (sleep 1) (fail :jammed))
-(sleep 5)"
-        )
-    };
-    let unhandled = |count: usize| vec![("unhandled-failure", 1); count];
-    check_findings(&text(":tasks"), &unhandled(2));
-    check_findings(&text(":tasks :stuck"), &unhandled(1));
-    check_findings(&text(":tasks :stuck :lost"), &[]);
-    check_findings(&text(":look"), &unhandled(1));
-    check_findings(&text(":drive :jammed"), &[]);
-    check_findings(&text(":main"), &[]);
 }
 
 #[test]

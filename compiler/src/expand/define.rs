@@ -6,7 +6,7 @@ use esl_bytecode::compile::{Environment, InternError};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
-use esl_bytecode::symbol::Symbol;
+use esl_bytecode::symbol::{Symbol, setf_cell};
 
 use super::call::quoted_symbol;
 use super::chunk::Purpose;
@@ -238,6 +238,17 @@ fn declared_type(specifier: &Datum) -> Vec<Datum> {
     named.map(note).collect()
 }
 
+/// Returns the symbol under which a function is known that `named` names: a symbol, or `(setf symbol)`.
+fn function_name(named: &Datum) -> Option<Symbol> {
+    if let Some(symbol) = named.as_symbol() {
+        return Some(symbol.clone());
+    }
+    match named.as_list()?.as_slice() {
+        [head, place] if head.as_symbol()?.is_cl("SETF") => Some(setf_cell(place.as_symbol()?)),
+        _ => None,
+    }
+}
+
 /// Returns the forms that note `(fails name cause*)`: the causes of failures that may leave the function
 /// `name`, or each of several in a list. Analyses read them; a run does not.
 fn declared_failures(expander: &mut Expander, specifier: &Datum, form: &Form) -> Checked<Option<Vec<Datum>>> {
@@ -253,7 +264,7 @@ fn declared_failures(expander: &mut Expander, specifier: &Datum, form: &Form) ->
     let Some((named, causes)) = rest.split_first() else {
         return Err(malformed(specifier, "the name of a function and causes"));
     };
-    let names = match named.as_symbol() {
+    let names = match function_name(named) {
         Some(_) => vec![*named],
         None => {
             named.as_list().ok_or_else(|| malformed(named, "the name of a function, or a list of names"))?
@@ -268,10 +279,10 @@ fn declared_failures(expander: &mut Expander, specifier: &Datum, form: &Form) ->
     let make = Make(specifier.span());
     let mut forms = Vec::new();
     for named in names {
-        let name = named.as_symbol().ok_or_else(|| malformed(named, "names of functions"))?;
+        let name = function_name(named).ok_or_else(|| malformed(named, "names of functions"))?;
         let indicator = make.quote(make.symbol(&Symbol::esl("%FAILS")));
         let causes = make.quote(make.items(symbols.iter().cloned()));
-        forms.push(make.call_esl("%PUT", [make.quote(make.symbol(name)), indicator, causes]));
+        forms.push(make.call_esl("%PUT", [make.quote(make.symbol(&name)), indicator, causes]));
     }
     Ok(Some(forms))
 }
