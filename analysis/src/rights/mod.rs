@@ -5,14 +5,19 @@
 //! whose object is computed, is listed as not known. Not here: rights of other modules for robots, and of
 //! code that is made at run time.
 
+mod constant;
+
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use esl_bytecode::compile::MODULE_SOURCES;
-use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::{Callee, Core, NodeId, NodeKind};
 use esl_compiler::diagnostic::Sources;
+
+use crate::forms::symbols_inside;
+use crate::library::function_positions;
+use constant::{constant_name, constant_text, constant_texts, is_nil, keyword, program_of};
 
 /// Object of a call: the positions of the arguments that name it.
 #[derive(Clone, Copy)]
@@ -29,6 +34,12 @@ enum CallObject {
     Command(usize),
     /// A path that is read, or written if the keyword `:direction` says so.
     File(usize),
+    /// A path, the folder of which is meant.
+    Folder(usize),
+    /// A new name, which may be in the folder of the old one, and the old one.
+    NewName(usize, usize),
+    /// A path that gets `.bak` behind it, if the keyword `:if-exists` says so.
+    Backup(usize),
 }
 
 /// Package and name of a function, the rights that it needs, and their object. A function that needs rights
@@ -56,6 +67,7 @@ const ROWS: &[RightsRow] = &[
     ("OS", "GETENV", &["env"], CallObject::Text(0)),
     ("LOG", "TO-FILE", &["write"], CallObject::Text(0)),
     ("COMMON-LISP", "OPEN", &[], CallObject::File(0)),
+    ("COMMON-LISP", "OPEN", &["write"], CallObject::Backup(0)),
     ("COMMON-LISP", "LOAD", &["read"], CallObject::Text(0)),
     ("COMMON-LISP", "PROBE-FILE", &["read"], CallObject::Text(0)),
     ("COMMON-LISP", "TRUENAME", &["read"], CallObject::Text(0)),
@@ -63,8 +75,8 @@ const ROWS: &[RightsRow] = &[
     ("COMMON-LISP", "FILE-WRITE-DATE", &["read"], CallObject::Text(0)),
     ("COMMON-LISP", "DELETE-FILE", &["write"], CallObject::Text(0)),
     ("COMMON-LISP", "RENAME-FILE", &["write"], CallObject::Text(0)),
-    ("COMMON-LISP", "RENAME-FILE", &["write"], CallObject::Text(1)),
-    ("COMMON-LISP", "ENSURE-DIRECTORIES-EXIST", &["write"], CallObject::Text(0)),
+    ("COMMON-LISP", "RENAME-FILE", &["write"], CallObject::NewName(1, 0)),
+    ("COMMON-LISP", "ENSURE-DIRECTORIES-EXIST", &["write"], CallObject::Folder(0)),
     ("ESL", "WATCH-PATH", &["read"], CallObject::Text(0)),
 ];
 
@@ -151,6 +163,9 @@ pub fn needed_rights(cores: &[Core], sources: &Sources) -> NeededRights {
                 NodeKind::Call(callee, arguments) => {
                     if let Some(symbol) = symbol_of(callee) {
                         add_call(core, &symbol, Some(arguments), &place, &mut needed);
+                        for named in called_by_name(core, &symbol, arguments) {
+                            add_call(core, &named, None, &place, &mut needed);
+                        }
                     }
                 }
                 NodeKind::Apply(callee, _) => {
@@ -167,6 +182,29 @@ pub fn needed_rights(cores: &[Core], sources: &Sources) -> NeededRights {
         }
     }
     needed
+}
+
+/// Returns the symbols among the arguments of a call that are names of functions which it calls, such as
+/// `'probe-file` in `(mapcar 'probe-file paths)`; those in a constant form for `eval`.
+fn called_by_name(core: &Core, callee: &Symbol, arguments: &[NodeId]) -> Vec<Symbol> {
+    let constant = |node: &NodeId| match &core.nodes[node.index()].kind {
+        NodeKind::Constant(datum) => Some(datum),
+        _ => None,
+    };
+    if callee.is_cl("EVAL") || callee.is_cl("COMPILE") {
+        return arguments.iter().filter_map(constant).flat_map(symbols_inside).collect();
+    }
+    let is_library = callee.is_in("COMMON-LISP") || callee.is_in("ESL");
+    let called = if is_library { function_positions(callee.name()) } else { &[] };
+    let is_key = |node: &NodeId| {
+        keyword(core, *node).is_some_and(|key| ["KEY", "TEST", "TEST-NOT"].contains(&key.name()))
+    };
+    let is_called =
+        |position: usize| called.contains(&position) || position > 0 && is_key(&arguments[position - 1]);
+    let symbol = |(position, node): (usize, &NodeId)| {
+        constant(node)?.as_symbol().filter(|_| is_called(position)).cloned()
+    };
+    arguments.iter().enumerate().filter_map(symbol).collect()
 }
 
 fn symbol_of(callee: &Callee) -> Option<Symbol> {
@@ -225,7 +263,21 @@ fn add_row(
         }
         CallObject::Url(position) => (rights.to_vec(), text(position).and_then(|url| address_of(&url))),
         CallObject::Text(position) => (rights.to_vec(), text(position)),
-        CallObject::Pattern(position) => (rights.to_vec(), text(position).map(|path| folder_of(&path))),
+        CallObject::Pattern(position) | CallObject::Folder(position) => {
+            (rights.to_vec(), text(position).map(|path| folder_of(&path)))
+        }
+        CallObject::NewName(new, old) => {
+            let beside = |name: String| match name.contains('/') {
+                true => Some(name),
+                false => text(old).map(|path| folder_of(&path) + &name),
+            };
+            (rights.to_vec(), text(new).and_then(beside))
+        }
+        CallObject::Backup(position) => match backup(core, arguments) {
+            Backup::None => return,
+            Backup::Perhaps => (rights.to_vec(), None),
+            Backup::Made => (rights.to_vec(), text(position).map(|path| path + ".bak")),
+        },
         CallObject::Command(position) => {
             let node = arguments.and_then(|arguments| arguments.get(position));
             (rights.to_vec(), node.and_then(|node| program_of(core, *node)))
@@ -337,76 +389,6 @@ fn add_session(
     without_flag.into_iter().for_each(unknown);
 }
 
-/// Returns whether a node is the constant `NIL`.
-fn is_nil(core: &Core, node: NodeId) -> bool {
-    matches!(&core.nodes[node.index()].kind, NodeKind::Constant(datum) if datum.is_nil())
-}
-
-/// Returns the keyword that a node is.
-fn keyword(core: &Core, node: NodeId) -> Option<Symbol> {
-    match &core.nodes[node.index()].kind {
-        NodeKind::Constant(datum) => datum.as_symbol().filter(|symbol| symbol.is_keyword()).cloned(),
-        _ => None,
-    }
-}
-
-/// Returns the name that a constant is, a string or a symbol, in lower case.
-fn constant_name(core: &Core, node: NodeId) -> Option<String> {
-    let text = constant_text(core, node).or_else(|| match &core.nodes[node.index()].kind {
-        NodeKind::Constant(datum) => datum.as_symbol().map(|symbol| symbol.name().to_string()),
-        _ => None,
-    });
-    text.map(|text| text.to_lowercase())
-}
-
-/// Returns the strings that a node names: one, a quoted list of some, or a call of `list`.
-fn constant_texts(core: &Core, node: NodeId) -> Option<Vec<String>> {
-    if let Some(text) = constant_text(core, node) {
-        return Some(vec![text]);
-    }
-    match &core.nodes[node.index()].kind {
-        NodeKind::Constant(datum) => {
-            let text = |item: &Datum| match item.kind() {
-                DatumKind::String(text) => Some(text.to_string()),
-                _ => None,
-            };
-            datum.elements().map(text).collect()
-        }
-        NodeKind::Call(callee, items) if symbol_of(callee)?.is_cl("LIST") => {
-            items.iter().map(|item| constant_text(core, *item)).collect()
-        }
-        _ => None,
-    }
-}
-
-/// Returns a constant as a text: a string, or the digits of an integer.
-fn constant_text(core: &Core, node: NodeId) -> Option<String> {
-    match &core.nodes[node.index()].kind {
-        NodeKind::Constant(datum) => match datum.kind() {
-            DatumKind::String(text) => Some(text.to_string()),
-            DatumKind::Integer(number) => Some(number.to_string()),
-            _ => None,
-        },
-        _ => None,
-    }
-}
-
-/// Returns the program of a command that a node names: the first of a quoted list, or of a call of `list`.
-fn program_of(core: &Core, node: NodeId) -> Option<String> {
-    match &core.nodes[node.index()].kind {
-        NodeKind::Constant(datum) => match datum.elements().next()?.kind() {
-            DatumKind::String(text) => Some(text.to_string()),
-            _ => None,
-        },
-        NodeKind::Call(callee, items) => {
-            let symbol = symbol_of(callee)?;
-            let is_list = symbol.is_cl("LIST") || symbol.is_cl("LIST*") || symbol.is_cl("CONS");
-            is_list.then(|| constant_text(core, *items.first()?))?
-        }
-        _ => None,
-    }
-}
-
 /// Returns the rights for a call of `open`.
 fn directions(core: &Core, arguments: Option<&Vec<NodeId>>) -> Vec<&'static str> {
     let Some(arguments) = arguments else { return vec!["read", "write"] };
@@ -426,6 +408,27 @@ fn directions(core: &Core, arguments: Option<&Vec<NodeId>>) -> Vec<&'static str>
         Some("INPUT" | "PROBE") => read(),
         Some("OUTPUT") => vec!["write"],
         _ => vec!["read", "write"],
+    }
+}
+
+/// Whether a call of `open` keeps the old file under another name.
+enum Backup {
+    None,
+    Perhaps,
+    Made,
+}
+
+fn backup(core: &Core, arguments: Option<&Vec<NodeId>>) -> Backup {
+    let Some(arguments) = arguments else { return Backup::Perhaps };
+    let is_answer = |node: &NodeId| keyword(core, *node).is_some_and(|key| key.name() == "IF-EXISTS");
+    let Some(position) = arguments.iter().position(is_answer) else { return Backup::None };
+    let answer = arguments.get(position + 1);
+    match answer.and_then(|node| keyword(core, *node)).as_ref().map(Symbol::name) {
+        _ if !directions(core, Some(arguments)).contains(&"write") => Backup::None,
+        Some("RENAME" | "RENAME-AND-DELETE") => Backup::Made,
+        Some(_) => Backup::None,
+        None if answer.is_some_and(|node| is_nil(core, *node)) => Backup::None,
+        None => Backup::Perhaps,
     }
 }
 
