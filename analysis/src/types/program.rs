@@ -13,7 +13,7 @@ use super::set::TypeSet;
 use super::slots::{self, SlotKey};
 use crate::cause::may_be_mistake;
 use crate::clause::can_end;
-use crate::forms::{CoreForms, ScopeKind, function_name, symbols_inside};
+use crate::forms::{CoreForm, CoreForms, ScopeKind, function_name, symbols_inside};
 
 /// Deepest nesting of a form that is walked.
 const DEEPEST: u32 = 200;
@@ -69,6 +69,11 @@ impl ProgramDefinitions {
                 {
                     changed.extend(symbols_inside(datum));
                 }
+                if let NodeKind::FunctionRef(symbol) = &node.kind {
+                    is_open |= makes_code(symbol);
+                } else if let NodeKind::BuiltinRef(builtin) = &node.kind {
+                    is_open |= makes_code(&builtin.symbol());
+                }
                 let (NodeKind::Call(callee, arguments) | NodeKind::Apply(callee, arguments)) = &node.kind
                 else {
                     continue;
@@ -101,6 +106,10 @@ impl ProgramDefinitions {
                     }
                     // Code that comes when the program runs may define anything anew.
                     "LOAD" => is_open = true,
+                    "EVAL" | "COMPILE" if called.is_in("COMMON-LISP") => {
+                        is_open |= !is_constant_code(form, arguments);
+                        changed.extend(arguments.iter().filter_map(|node| constant(Some(node))));
+                    }
                     "%MAKE-CLASS" => {
                         if let Some(name) = constant(arguments.first()) {
                             *made.entry(name).or_default() += 1;
@@ -192,6 +201,21 @@ impl ProgramDefinitions {
     pub(super) fn class(&self, class: &Symbol) -> u64 {
         self.bits.get(class).copied().unwrap_or(u64::MAX)
     }
+}
+
+/// Whether a function of this name runs code that is not in the program's text, or may do so.
+fn makes_code(name: &Symbol) -> bool {
+    ["LOAD", "EVAL", "COMPILE"].into_iter().any(|known| name.is_cl(known))
+}
+
+/// Whether all code that a call of `eval` or `compile` gets is constant, and defines functions at most: their
+/// names are among the quoted ones.
+fn is_constant_code(form: &CoreForm, arguments: &[NodeId]) -> bool {
+    let opens = |symbol: &Symbol| makes_code(symbol) || symbol.name() == "DEFSTRUCT";
+    arguments.iter().all(|argument| match form.kind(*argument) {
+        NodeKind::Constant(datum) => !symbols_inside(datum).iter().any(opens),
+        _ => false,
+    })
 }
 
 /// Whether a form is nested too deeply for a walk by recursion.

@@ -230,3 +230,23 @@ fn declared_types_are_compared_with_inferred_ones() {
         "(declaim (ftype (function (&rest t) t) f) (ftype function g)) (defun f (n) n) (defun g () 1)",
     );
 }
+
+#[test]
+fn code_that_is_made_at_run_time_may_define_anything_anew() {
+    let program = "(defun name () \"a\") (defun f () (+ 1 (name)))";
+    let warning = "`+` needs a number, and gets a string | (name) | ";
+    for unknown in [
+        "(eval (read))",
+        "(eval (list 'defun 'name () 1))",
+        "(eval '(defun name () 1))",
+        "(eval '(eval (read)))",
+        "(mapcar #'eval (read))",
+        "(funcall (compile nil (list 'lambda () (read))))",
+        "(compile 'name '(lambda () 1))",
+    ] {
+        check_none(&format!("{program} {unknown}"));
+    }
+    for known in ["(eval '(+ 1 2))", "(eval '(defun other () 1))", "(compile nil '(lambda () 1))"] {
+        check(&format!("{program} {known}"), &[warning]);
+    }
+}
