@@ -29,6 +29,7 @@ mod handling;
 mod hot;
 mod library;
 mod many;
+mod meeting;
 mod objects;
 mod orders;
 mod pending;

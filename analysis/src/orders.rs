@@ -4,9 +4,9 @@
 //! Each task is followed through the code that it may run, with the resources that it holds there. A wait for
 //! another resource is a *step* from each held one. A circle of steps is reported if they can be of different
 //! tasks, and no resource is held at all of them, which would keep them apart (Havelund 2000, GoodLock). Only
-//! resources count of which there is one, and waits without a limit of time. Not known: whether the tasks
-//! run at the same time, and resources that recovery procedures take while code inside of their form holds
-//! others.
+//! resources count of which there is one, and waits without a limit of time. `meeting` tells tasks apart that
+//! never run at the same time. Not known: resources that recovery procedures take while code inside of their
+//! form holds others.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -20,8 +20,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::effect::NodeEffect;
 use crate::flow::ValueFlow;
 use crate::forms::{CoreForm, CoreForms};
+use crate::meeting::{TaskMeetings, is_begun_often};
 use crate::solve::bodies_of_works;
-use crate::value::{Code, NO_CONTEXT, Spot, TaskKind, WorkId, WorkKey};
+use crate::value::{Code, NO_CONTEXT, TaskKind, WorkId, WorkKey};
 
 /// Most pairs of code and held resources that are looked at.
 const MOST_STATES: usize = 50_000;
@@ -29,7 +30,7 @@ const MOST_STATES: usize = 50_000;
 const LONGEST: usize = 4;
 
 /// A task that takes resources: the main task is `None`.
-type Taker = Option<WorkId>;
+pub(crate) type Taker = Option<WorkId>;
 
 /// A resource, by its number in the order of names.
 type ResourceNumber = usize;
@@ -266,16 +267,10 @@ impl OrderWalk<'_, '_> {
 
     /// Whether a task may run more than once at the same time.
     fn is_many(&self, taker: Taker) -> bool {
-        let Some(work) = taker.map(|work| &self.flow.works[work.index()]) else { return false };
-        let WorkKey::Begun(Spot { form, node, .. }, _) = work.key else { return true };
-        let form = &self.flow.forms.forms[form as usize];
-        let own = form.core.nodes[node.index()].span;
-        let is_in_loop = form
-            .core
-            .nodes
-            .iter()
-            .any(|node| matches!(node.kind, NodeKind::Tagbody(..)) && node.span.contains(own));
-        work.kind == TaskKind::Spawned && (form.owners[node.index()] != LambdaId(0) || is_in_loop)
+        let Some(work) = taker else { return false };
+        let is_begun = matches!(self.flow.works[work.index()].key, WorkKey::Begun(..));
+        let is_spawned = self.flow.works[work.index()].kind == TaskKind::Spawned;
+        !is_begun || is_spawned && is_begun_often(self.flow, work)
     }
 
     /// Returns warnings about the circles of steps, one for each set of resources.
@@ -283,9 +278,11 @@ impl OrderWalk<'_, '_> {
         let steps: Vec<&OrderStep> = self.steps.iter().collect();
         let mut told: BTreeSet<Vec<ResourceNumber>> = BTreeSet::new();
         let mut found = Vec::new();
+        // Most programs have no circle.
+        let meetings = TaskMeetings::new(self.flow, if steps.is_empty() { &[] } else { &self.bodies });
         for length in 2..=LONGEST {
             for first in &steps {
-                self.close(&steps, &mut vec![first], length, &mut told, &mut found);
+                self.close(&meetings, &steps, &mut vec![first], length, &mut told, &mut found);
             }
         }
         found
@@ -294,6 +291,7 @@ impl OrderWalk<'_, '_> {
     /// Adds steps to a row of some until it is a circle of `length`.
     fn close<'s>(
         &self,
+        meetings: &TaskMeetings<'_, '_>,
         steps: &[&'s OrderStep],
         row: &mut Vec<&'s OrderStep>,
         length: usize,
@@ -315,20 +313,21 @@ impl OrderWalk<'_, '_> {
         for next in steps.iter().filter(|next| next.from == last.to) {
             // A circle begins with its smallest resource, and has each once.
             let is_next = next.from > first.from
-                && row.iter().all(|step| step.from != next.from && self.may_meet(step, next));
+                && row.iter().all(|step| step.from != next.from && self.may_meet(meetings, step, next));
             if is_next {
                 row.push(next);
-                self.close(steps, row, length, told, found);
+                self.close(meetings, steps, row, length, told, found);
                 row.pop();
             }
         }
     }
 
     /// Whether two tasks may be at these steps at the same time.
-    fn may_meet(&self, one: &OrderStep, other: &OrderStep) -> bool {
+    fn may_meet(&self, meetings: &TaskMeetings<'_, '_>, one: &OrderStep, other: &OrderStep) -> bool {
         let are_apart = one.held.iter().any(|(name, is_around)| {
             other.held.iter().any(|(known, is_too)| known == name && !(*is_around && *is_too))
         });
+        let are_apart = are_apart || meetings.are_apart(one.taker, other.taker);
         !are_apart && (one.taker != other.taker || self.is_many(one.taker))
     }
 

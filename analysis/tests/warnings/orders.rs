@@ -119,3 +119,29 @@ fn tasks_that_one_place_makes_may_meet() {
     check(&format!("(dolist (x '(t nil)) (spawn () {body}))"), "`a` and `b`");
     check_none(&format!("(let ((x (read))) (spawn () {body}))"));
 }
+
+/// A clause of a form with tasks, which takes resources one inside of the other.
+fn clause(id: &str, names: &str) -> String {
+    task(names).replacen("(spawn ()", &format!("({id}"), 1)
+}
+
+#[test]
+fn tasks_that_never_run_at_the_same_time_do_not_wait_for_each_other() {
+    let (ab, ba) = (clause("one", "ab"), clause("two", "ba"));
+    check(&format!("(task-net {ab} {ba})"), "`a` and `b`");
+    // Tests run by themselves, with all their tasks.
+    check_none(&format!("(deftest x {} (is t)) (deftest y {} (is t))", task("ab"), task("ba")));
+    check(&format!("(deftest x {} {} (is t))", task("ab"), task("ba")), "`a` and `b`");
+    // The bodies of one form, and forms one after another.
+    check_none(&format!("(try-in-order {ab} {ba})"));
+    check_none(&format!("(task-net {ab}) (task-net {ba})"));
+    check_none(&format!("(task-net {ab}) (with-resource (b) (with-resource (a) 1))"));
+    check_none(&format!("(defun f () (task-net {ab}) (or-parallel {ba})) (task-net (three (f)))"));
+    // Not if the function, or the task around the forms, is there twice.
+    let twice = format!("(defun f () (try-in-order {ab} {ba}))");
+    check_none(&format!("{twice} (f)"));
+    check(&format!("{twice} (spawn () (f)) (spawn () (f))"), "`a` and `b`");
+    check(&format!("{twice} (spawn () (with-timeout 9 (f))) (f)"), "`a` and `b`");
+    check(&format!("(dolist (x '(1 2)) (spawn () (try-in-order {ab} {ba})))"), "`a` and `b`");
+    check(&format!("{} (task-net {ba})", task("ab")), "`a` and `b`");
+}
