@@ -3,11 +3,12 @@
 
 use std::fmt::Write;
 
+use esl_bytecode::symbol::Symbol;
 use esl_compiler::core::{LambdaId, NodeId};
 use rustc_hash::FxHashSet;
 
-use crate::cause::shown_cause;
-use crate::effect::NodeEffect;
+use crate::cause::{Applies, clause_applies, is_of_mistake, shown_cause};
+use crate::effect::{FailureKind, NodeEffect};
 use crate::forms::ScopeKind;
 use crate::guard::FailureId;
 use crate::solve::bodies_of_works;
@@ -37,7 +38,58 @@ impl WayTree {
     }
 }
 
+/// A cause to be explained.
+enum WantedCause {
+    /// All that are not known.
+    Any,
+    /// Those of functions that are not known.
+    Unknown,
+    /// One with all below it.
+    Named(Symbol),
+}
+
+impl WantedCause {
+    /// Reads a cause as the table writes it; the colon may be missing.
+    fn read(text: &str) -> WantedCause {
+        match text.split(' ').next() {
+            Some("any") => return WantedCause::Any,
+            Some("unknown") => return WantedCause::Unknown,
+            _ => {}
+        }
+        let name = text.strip_prefix(':').unwrap_or(text);
+        let Some(barred) = name.strip_prefix('|').and_then(|name| name.strip_suffix('|')) else {
+            return WantedCause::Named(Symbol::keyword(&name.to_uppercase()));
+        };
+        let mut plain = String::new();
+        let mut characters = barred.chars();
+        while let Some(c) = characters.next() {
+            plain.extend(if c == '\\' { characters.next() } else { Some(c) });
+        }
+        WantedCause::Named(Symbol::keyword(&plain))
+    }
+
+    fn shown(&self) -> String {
+        match self {
+            WantedCause::Any => "any".into(),
+            WantedCause::Unknown => "unknown".into(),
+            WantedCause::Named(name) => shown_cause(name),
+        }
+    }
+}
+
 impl Maker<'_, '_> {
+    /// Returns whether failures of a kind have a cause, or may have it.
+    fn is_wanted(&self, kind: FailureKind, wanted: &WantedCause) -> bool {
+        match (wanted, kind) {
+            (WantedCause::Any, _) => matches!(kind, FailureKind::Any(_) | FailureKind::Unknown(_)),
+            (WantedCause::Unknown, _) => matches!(kind, FailureKind::Unknown(_)),
+            (_, FailureKind::Any(_) | FailureKind::Unknown(_)) => false,
+            (WantedCause::Named(name), _) => {
+                clause_applies(self.flow.forms, &self.flow.names, kind, name) != Applies::No
+            }
+        }
+    }
+
     /// Returns the ways of all failures with a cause, as a tree with places.
     pub(crate) fn explain(&self, cause: &str) -> String {
         let mut tree = WayTree {
@@ -46,23 +98,29 @@ impl Maker<'_, '_> {
             seen: FxHashSet::default(),
             bodies: bodies_of_works(self.flow),
         };
-        let in_lower_case = cause.to_lowercase();
-        let is_wanted = |shown: &str| shown == cause || shown == in_lower_case;
-        tree.line(0, if cause.contains('|') { cause } else { &in_lower_case });
+        let wanted = WantedCause::read(cause);
+        tree.line(0, &wanted.shown());
         let mut starts: Vec<(String, FailureId)> = Vec::new();
         for (index, failing) in self.solution.failures.keys.iter().enumerate() {
-            if is_wanted(&self.cause(failing.kind)) {
+            if self.is_wanted(failing.kind, &wanted) {
                 starts.push((self.place(failing.form, failing.node).to_string(), index as FailureId));
             }
         }
         starts.sort();
-        if starts.is_empty() {
-            tree.line(1, "no place in this program fails with it");
+        match &wanted {
+            WantedCause::Named(name) if is_of_mistake(name) => {
+                tree.line(1, "programming errors have no ways here; `eslc failures --all` lists them");
+            }
+            _ if starts.is_empty() => tree.line(1, "no place in this program fails with it"),
+            _ => {}
         }
         for (place, failure) in starts {
             let failing = self.solution.failures.keys[failure as usize];
             let owner = self.flow.forms.forms[failing.form as usize].owners[failing.node.index()];
-            tree.line(1, &format!("begins at {place}, in {}", self.function_around(failing.form, owner)));
+            let shown = self.cause(failing.kind);
+            let kind = if shown == wanted.shown() { String::new() } else { format!(", as {shown}") };
+            let function = self.function_around(failing.form, owner);
+            tree.line(1, &format!("begins at {place}, in {function}{kind}"));
             for number in 0..self.flow.running.len() {
                 let code = self.flow.running[number].code;
                 if code.form == failing.form && code.lambda == owner {

@@ -40,7 +40,7 @@ pub(super) fn rows(table: &FailureTable) -> CellLines {
 /// Returns lines as CSV (RFC 4180).
 pub(super) fn csv(lines: &CellLines) -> String {
     let cell = |text: &String| {
-        if text.contains([',', '"', '\n']) {
+        if text.contains([',', '"', '\n', '\r']) {
             format!("\"{}\"", text.replace('"', "\"\""))
         } else {
             text.clone()
@@ -49,12 +49,30 @@ pub(super) fn csv(lines: &CellLines) -> String {
     lines.iter().map(|line| line.iter().map(cell).collect::<Vec<_>>().join(",") + "\r\n").collect()
 }
 
+/// Returns a text as a cell of a table of Markdown, which is one line.
+pub fn markdown_cell(text: &str) -> String {
+    let mut cell = String::new();
+    for line in text.replace("\r\n", "\n").split(['\n', '\r']) {
+        if !cell.is_empty() {
+            cell += "<br>";
+        }
+        for c in line.chars() {
+            match c {
+                '\\' | '|' => cell.extend(['\\', c]),
+                '&' => cell += "&amp;",
+                '<' => cell += "&lt;",
+                other => cell.push(other),
+            }
+        }
+    }
+    cell
+}
+
 /// Returns lines as a table of Markdown.
 pub(super) fn markdown(lines: &CellLines) -> String {
     let mut text = String::new();
     for (index, line) in lines.iter().enumerate() {
-        let cells: Vec<String> =
-            line.iter().map(|cell| cell.replace('|', "\\|").replace('<', "&lt;")).collect();
+        let cells: Vec<String> = line.iter().map(|cell| markdown_cell(cell)).collect();
         // Writing to a text does not fail.
         _ = writeln!(text, "| {} |", cells.join(" | "));
         if index == 0 {
@@ -84,4 +102,18 @@ pub(super) fn html(title: &str, lines: &CellLines) -> String {
     }
     text.push_str("</table>\n</body></html>\n");
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_of_markdown_is_one_line() {
+        let lines = vec![vec!["a".into(), "b".into()], vec!["|x\\||".into(), "one\r\ntwo\n<b>&amp;".into()]];
+        assert_eq!(
+            markdown(&lines),
+            "| a | b |\n| --- | --- |\n| \\|x\\\\\\|\\| | one<br>two<br>&lt;b>&amp;amp; |\n"
+        );
+    }
 }

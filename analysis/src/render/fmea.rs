@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 
 use super::flat::CellLines;
 use super::injected::{InjectedOutcomes, end_effect, exercised};
+use super::notes::{EarlierNotes, NoteCells};
 use super::text::end_of;
-use crate::row::{CauseRow, FailureOrigin, FailureTable};
+use crate::row::{CauseRow, FailingTask, FailureOrigin, FailureTable, FunctionRow};
 use crate::value::TaskKind;
 
 const HEADINGS: [&str; 10] = [
@@ -23,17 +24,63 @@ const HEADINGS: [&str; 10] = [
     "notes",
 ];
 
-/// Text in the column of notes of a line whose failure the program no longer has.
-const STALE: &str = "stale: no longer in the program";
-
 fn has(rows: &[CauseRow], cause: &str, origin: &FailureOrigin) -> bool {
     rows.iter().any(|row| row.cause == cause && row.origins.contains(origin))
 }
 
-/// Returns the lines, with severities and notes of `earlier`, a table in CSV that this has made, and with the
-/// outcomes of injected runs.
-pub(super) fn lines(table: &FailureTable, earlier: Option<&str>, mut seen: InjectedOutcomes) -> CellLines {
-    let mut kept = notes_of(earlier.unwrap_or_default());
+/// The effects of a failure mode.
+struct ModeEffects {
+    local: String,
+    end: String,
+}
+
+impl ModeEffects {
+    /// Returns the effects of the failures that `is_in` finds among rows, which begin in `item`.
+    fn new(
+        table: &FailureTable,
+        item: &str,
+        is_in: &dyn Fn(&[CauseRow]) -> bool,
+        is_taken: bool,
+    ) -> ModeEffects {
+        let ended: Vec<&FailingTask> = table.tasks.iter().filter(|task| is_in(&task.causes)).collect();
+        let leaves = |function: &FunctionRow| function.name == item && is_in(&function.causes);
+        let local = if table.functions.iter().any(leaves) {
+            format!("leaves {item}")
+        } else if !ended.is_empty() {
+            // It begins in the body of a task: nothing is left but that.
+            let mut ends: Vec<&str> = Vec::new();
+            for task in &ended {
+                let end = match task.kind {
+                    TaskKind::Main | TaskKind::Test | TaskKind::Mock | TaskKind::Host => end_of(task),
+                    _ => "ends the task",
+                };
+                if !ends.contains(&end) {
+                    ends.push(end);
+                }
+            }
+            ends.join("; ")
+        } else if is_taken {
+            "is taken inside".into()
+        } else {
+            "none".into()
+        };
+        let (tests, others): (Vec<&FailingTask>, Vec<&FailingTask>) =
+            ended.into_iter().partition(|task| task.kind == TaskKind::Test);
+        let shown = |task: &&FailingTask| match task.kind {
+            TaskKind::Main => end_of(task).to_string(),
+            _ => format!("{}: {}", task.name, end_of(task)),
+        };
+        let end = match (others.is_empty(), tests.first()) {
+            (false, _) => others.iter().map(shown).collect::<Vec<_>>().join("; "),
+            (true, Some(test)) => end_of(test).into(),
+            (true, None) => "the mission goes on".into(),
+        };
+        ModeEffects { local, end }
+    }
+}
+
+/// Returns the lines, with severities and notes of an earlier table, and with the outcomes of injected runs.
+pub(super) fn lines(table: &FailureTable, mut kept: EarlierNotes, mut seen: InjectedOutcomes) -> CellLines {
     let mut modes: BTreeMap<(String, String), Vec<FailureOrigin>> = BTreeMap::new();
     let all = table
         .tasks
@@ -52,7 +99,7 @@ pub(super) fn lines(table: &FailureTable, earlier: Option<&str>, mut seen: Injec
     let mut lines = vec![HEADINGS.map(String::from).to_vec()];
     for ((item, mode), mut origins) in modes {
         origins.sort();
-        let (severity, notes) = kept.remove(&(item.clone(), mode.clone())).unwrap_or_default();
+        let NoteCells { severity, notes } = kept.take(&item, &mode);
         let places: Vec<String> =
             origins.iter().map(|origin| format!("{}:{}", origin.place.source, origin.place.line)).collect();
         let is_in = |rows: &[CauseRow]| origins.iter().any(|origin| has(rows, &mode, origin));
@@ -60,30 +107,7 @@ pub(super) fn lines(table: &FailureTable, earlier: Option<&str>, mut seen: Injec
         let detection: Vec<String> =
             takers.iter().map(|clause| format!("{} in {}", clause.wanted, clause.function)).collect();
         let compensation: Vec<String> = takers.iter().map(|clause| clause.answer.clone()).collect();
-        let leaves: Vec<&str> = table
-            .functions
-            .iter()
-            .filter(|function| function.name == item && is_in(&function.causes))
-            .map(|function| function.name.as_str())
-            .collect();
-        let local = if leaves.is_empty() {
-            "is taken inside".to_string()
-        } else {
-            format!("leaves {}", leaves.join(", "))
-        };
-        let ends: Vec<String> = table
-            .tasks
-            .iter()
-            .filter(|task| task.kind != TaskKind::Test && is_in(&task.causes))
-            .map(|task| {
-                if task.kind == TaskKind::Main {
-                    "ends the run".into()
-                } else {
-                    format!("{}: {}", task.name, end_of(task))
-                }
-            })
-            .collect();
-        let end = if ends.is_empty() { "the mission goes on".to_string() } else { ends.join("; ") };
+        let effects = ModeEffects::new(table, &item, &|rows| is_in(rows), !takers.is_empty());
         let tests: Vec<&str> = table
             .tasks
             .iter()
@@ -95,7 +119,7 @@ pub(super) fn lines(table: &FailureTable, earlier: Option<&str>, mut seen: Injec
             .map(|task| task.name.as_str())
             .collect();
         let runs = seen.take(&item, &mode).unwrap_or_default();
-        let end = if runs.is_empty() { end } else { end_effect(&runs) };
+        let end = if runs.is_empty() { effects.end } else { end_effect(&runs) };
         let tests: Vec<String> = tests.into_iter().map(String::from).chain(exercised(&runs)).collect();
         let or_none =
             |parts: Vec<String>| if parts.is_empty() { "none".to_string() } else { parts.join("; ") };
@@ -103,7 +127,7 @@ pub(super) fn lines(table: &FailureTable, earlier: Option<&str>, mut seen: Injec
             item,
             mode,
             places.join(", "),
-            local,
+            effects.local,
             or_none(detection),
             or_none(compensation),
             end,
@@ -113,84 +137,15 @@ pub(super) fn lines(table: &FailureTable, earlier: Option<&str>, mut seen: Injec
         ]);
     }
     for (item, mode, runs) in seen.rest() {
-        let (severity, notes) = kept.remove(&(item.clone(), mode.clone())).unwrap_or_default();
+        let NoteCells { severity, notes } = kept.take(&item, &mode);
         let none = || "none".to_string();
         let (end, tests) = (end_effect(&runs), exercised(&runs).join(", "));
         lines.push(vec![item, mode, "injected".into(), none(), none(), none(), end, tests, severity, notes]);
     }
-    for ((item, mode), (severity, notes)) in kept {
-        if severity.is_empty() && notes.is_empty() {
-            continue;
-        }
+    for (item, mode, NoteCells { severity, notes }) in kept.stale() {
         let mut line = vec![String::new(); HEADINGS.len()];
-        let notes = if notes.starts_with(STALE) { notes } else { format!("{STALE}; {notes}") };
         (line[0], line[1], line[8], line[9]) = (item, mode, severity, notes);
         lines.push(line);
     }
     lines
-}
-
-/// Returns severities and notes of a table in CSV, by item and failure mode.
-fn notes_of(csv: &str) -> BTreeMap<(String, String), (String, String)> {
-    let mut lines = cells(csv).into_iter();
-    let Some(headings) = lines.next() else { return BTreeMap::new() };
-    let column = |name: &str| headings.iter().position(|heading| heading == name);
-    let (Some(item), Some(mode), Some(severity), Some(notes)) =
-        (column("item"), column("failure mode"), column("severity"), column("notes"))
-    else {
-        return BTreeMap::new();
-    };
-    let cell = |line: &Vec<String>, index: usize| line.get(index).cloned().unwrap_or_default();
-    lines
-        .map(|line| ((cell(&line, item), cell(&line, mode)), (cell(&line, severity), cell(&line, notes))))
-        .collect()
-}
-
-/// Reads CSV (RFC 4180).
-fn cells(csv: &str) -> Vec<Vec<String>> {
-    let mut lines = Vec::new();
-    let (mut line, mut cell, mut is_quoted) = (Vec::new(), String::new(), false);
-    let mut characters = csv.chars().peekable();
-    while let Some(c) = characters.next() {
-        match c {
-            '"' if is_quoted && characters.peek() == Some(&'"') => {
-                characters.next();
-                cell.push('"');
-            }
-            '"' => is_quoted = !is_quoted,
-            ',' if !is_quoted => line.push(std::mem::take(&mut cell)),
-            '\r' if !is_quoted => {}
-            '\n' if !is_quoted => {
-                line.push(std::mem::take(&mut cell));
-                lines.push(std::mem::take(&mut line));
-            }
-            other => cell.push(other),
-        }
-    }
-    if !cell.is_empty() || !line.is_empty() {
-        line.push(cell);
-        lines.push(line);
-    }
-    lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cells_are_read_as_they_are_written() {
-        let lines: CellLines =
-            vec![vec!["a".into(), "b, \"c\"".into()], vec![String::new(), "two\nlines".into()]];
-        assert_eq!(cells(&super::super::flat::csv(&lines)), lines);
-    }
-
-    #[test]
-    fn notes_survive_and_stale_ones_are_marked() {
-        let csv = "item,failure mode,severity,notes\r\nslew,:stuck,2,oil it\r\n";
-        let known = notes_of(csv);
-        assert_eq!(known[&("slew".into(), ":stuck".into())], ("2".into(), "oil it".into()));
-        let lines = lines(&FailureTable::default(), Some(csv), InjectedOutcomes::default());
-        assert_eq!(lines[1][9], format!("{STALE}; oil it"));
-    }
 }

@@ -5,11 +5,14 @@ mod fmea;
 mod graph;
 mod injected;
 mod json;
+mod notes;
 mod text;
 
 use crate::row::FailureTable;
 
+pub use flat::markdown_cell;
 pub use injected::{InjectedError, InjectedOutcomes};
+pub use notes::{EarlierNotes, NotesError};
 
 /// Form of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,13 +45,13 @@ pub fn render_graph(table: &FailureTable, title: &str) -> String {
     graph::render(table, title)
 }
 
-/// Returns the failure modes and effects of a program as a table; as text, that is Markdown. `earlier` is
-/// such a table in CSV, whose severities and notes are carried over; `seen` has the outcomes of runs with
-/// injected faults, which are the end effects then.
+/// Returns the failure modes and effects of a program as a table; as text, that is Markdown. The severities
+/// and notes of `earlier` are carried over; `seen` has the outcomes of runs with injected faults, which are
+/// the end effects then.
 pub fn render_fmea(
     table: &FailureTable,
     format: TableFormat,
-    earlier: Option<&str>,
+    earlier: EarlierNotes,
     seen: InjectedOutcomes,
 ) -> String {
     let lines = fmea::lines(table, earlier, seen);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use esl::program;
-use esl_analysis::render::{InjectedOutcomes, TableFormat, render, render_fmea, render_graph};
+use esl_analysis::render::{EarlierNotes, InjectedOutcomes, TableFormat, render, render_fmea, render_graph};
 use esl_analysis::{AnalysisOptions, FailureTable, analyze};
 use esl_command as command;
 use esl_command::{FAILED, NOT_COMPILED, SUCCESS, USAGE};
@@ -19,9 +19,10 @@ pub(crate) struct FailureOptions {
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Form of the table
-    #[arg(long, value_enum, default_value_t = TableForm::Text)]
+    #[arg(long, value_enum, default_value_t = TableForm::Text, conflicts_with = "explain")]
     format: TableForm,
-    /// Show the ways of one cause, such as `:timeout`, instead of the table
+    /// Show the ways of one cause, such as `:timeout`, and of those below it, instead of the table; `any` for
+    /// those that are not known
     #[arg(long, value_name = "CAUSE")]
     explain: Option<String>,
     /// Print the failure modes and effects, one line for each cause and function in which it begins
@@ -73,7 +74,13 @@ pub(crate) fn list_failures(options: &FailureOptions) -> Result<u8, u8> {
         TableForm::Md => TableFormat::Markdown,
         TableForm::Html => TableFormat::Html,
     };
-    let earlier = options.notes.as_deref().map(read_text).transpose()?;
+    let earlier = match &options.notes {
+        Some(file) => EarlierNotes::read(&read_text(file)?).map_err(|error| {
+            command::complain(format_args!("--notes {}: {error}", file.display()));
+            USAGE
+        })?,
+        None => EarlierNotes::default(),
+    };
     let mut injected = Vec::new();
     for file in &options.injected {
         injected.push(read_text(file)?);
@@ -84,7 +91,7 @@ pub(crate) fn list_failures(options: &FailureOptions) -> Result<u8, u8> {
     })?;
     let text = match (&options.explain, options.fmea) {
         (Some(_), _) => explanation,
-        (None, true) => render_fmea(&table, format, earlier.as_deref(), seen),
+        (None, true) => render_fmea(&table, format, earlier, seen),
         (None, false) => render(&table, format),
     };
     print(&text)?;

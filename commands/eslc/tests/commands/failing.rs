@@ -45,6 +45,38 @@ fn possible_failures_are_listed() {
 }
 
 #[test]
+fn ways_are_those_of_a_cause_and_of_all_below_it() {
+    let text = "(define-cause :device ()) (define-cause :motor (:device)) (define-cause :|Dead End| ())
+(defun drive () (fail :motor))
+(defun look (why) (fail why))
+(defun turn () (fail :|Dead End|))
+(defun far () (elsewhere))
+(declaim (fails known-elsewhere :device))
+(with-recovery-procedures ((:device (abort))) (drive))
+(look (read)) (turn) (far) (known-elsewhere) (+ 1 (read))
+";
+    let folder = Folder::with("failing-ways", &[("mission.esl", text)]);
+    for (cause, said) in [
+        (":device", "begins at mission.esl:2:17, in drive, as :motor\n"),
+        (":motor", "begins at mission.esl:2:17, in drive\n"),
+        ("motor", ":motor\n  begins at mission.esl:2:17, in drive\n"),
+        (":|Dead End|", "begins at mission.esl:4:16, in turn\n"),
+        ("any", "begins at mission.esl:3:19, in look, as any (a computed cause)\n"),
+        ("any", "begins at mission.esl:5:15, in far, as unknown (elsewhere declares no failures)\n"),
+        ("unknown", "begins at mission.esl:5:15, in far, as unknown (elsewhere declares no failures)\n"),
+        (":type-error", "programming errors have no ways here; `eslc failures --all` lists them\n"),
+        (":lost", "no place in this program fails with it\n"),
+    ] {
+        let (_, output, errors) = run(&folder, &["failures", "--explain", cause, "mission.esl"]);
+        assert!(output.contains(said), "{cause}: {said}\n{output}{errors}");
+    }
+    let (status, _, errors) =
+        run(&folder, &["failures", "--explain", ":motor", "--format", "json", "mission.esl"]);
+    assert_eq!(status, Some(2));
+    assert!(errors.contains("cannot be used with"), "{errors}");
+}
+
+#[test]
 fn the_picture_shows_failures_clauses_and_goals() {
     let goal = "(defun there (metres) (> metres 1))
 (defun near (metres) (with-recovery-procedures ((:lost (abort))) (drive metres)))
@@ -94,6 +126,31 @@ fn rights_are_listed_with_those_that_are_not_known() {
 }
 
 #[test]
+fn rights_of_functions_by_name_and_of_other_paths_are_listed() {
+    let text = "(mapcar 'probe-file (list \"/a\"))
+        (sort (list \"/a\") #'< :key 'file-write-date)
+        (eval '(delete-file \"/a\"))
+        (print (list 'open 'truename))
+        (ensure-directories-exist \"/log/today/rover.txt\")
+        (rename-file \"/log/old.txt\" \"new.txt\")
+        (with-open-file (log \"/log/kept\" :direction :output :if-exists :rename) (print 1 log))
+        (with-open-file (log \"/log/plain\" :direction :output :if-exists :append) (print 1 log))
+        (with-open-file (log \"/log/read\" :if-exists :rename) (print (read-line log)))
+        (defun note (answer)
+          (with-open-file (log \"/log/notes\" :direction :output :if-exists answer) (print 1 log)))";
+    let folder = Folder::with("failing-rights-named", &[("rover.esl", text)]);
+    let (status, output, errors) = run(&folder, &["rights", "rover.esl"]);
+    let expected = "--allow-read=/log/read\n--allow-write=/log/kept\n--allow-write=/log/kept.bak\n\
+                    --allow-write=/log/new.txt\n--allow-write=/log/notes\n--allow-write=/log/old.txt\n\
+                    --allow-write=/log/plain\n--allow-write=/log/today/\n\
+                    # not known: --allow-read, for file-write-date at rover.esl:2:9\n\
+                    # not known: --allow-read, for probe-file at rover.esl:1:1\n\
+                    # not known: --allow-write, for delete-file at rover.esl:3:9\n\
+                    # not known: --allow-write, for open at rover.esl:11:11\n";
+    assert_eq!((status, output.as_str()), (Some(0), expected), "{errors}");
+}
+
+#[test]
 fn rights_of_agents_are_those_to_their_fleet_or_its_endpoints() {
     let text = "(require :fleet)
         (defun by-command () (fleet:join () (sleep 1)))
@@ -122,6 +179,43 @@ fn severities_and_notes_are_carried_over() {
     let (_, output, errors) = run(&folder, &arguments);
     assert!(output.contains(",1,look at it\r\n"), "{output}{errors}");
     assert!(output.contains("drive,:gone,,,,,,,2,stale: no longer in the program; old\r\n"), "{output}");
+}
+
+#[test]
+fn notes_that_cannot_be_read_are_not_lost() {
+    let notes = "item,failure mode,notes\ndrive,:lost,look at it\n";
+    let folder = Folder::with("failing-no-notes", &[("mission.esl", MISSION), ("notes.csv", notes)]);
+    let arguments = ["failures", "--fmea", "--format", "csv", "--notes", "notes.csv", "mission.esl"];
+    let (status, output, errors) = run(&folder, &arguments);
+    assert_eq!((status, output.as_str()), (Some(2), ""), "{errors}");
+    assert!(
+        errors.contains("--notes notes.csv: its first line does not have the columns `item`"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn effects_are_those_of_the_code_in_which_failures_begin() {
+    let text = "(define-cause :dark ()) (define-cause :cold ())
+(define-mock look () (fail :dark))
+(deftest looks (is (eq 1 1)) (fail :cold))
+(spawn (:name watch) (fail :dark))
+(with-recovery-procedures ((:cold (abort))) (fail :cold))
+(defun read-it () (ignore-errors (fail :cold)) (handler-case (fail :cold) (failure () 2)))
+(read-it)
+(fail :dark)
+";
+    let folder = Folder::with("failing-effects", &[("mission.esl", text)]);
+    let (_, output, errors) = run(&folder, &["failures", "--fmea", "--format", "csv", "mission.esl"]);
+    for said in [
+        "look,:dark,mission.esl:2,leaves look,",
+        "(test looks),:cold,mission.esl:3,fails the test,none,none,fails the test,",
+        "the top level,:dark,\"mission.esl:4, mission.esl:8\",ends the run; ends the task,none,none,",
+        "read-it,:cold,\"mission.esl:6, mission.esl:6\",leaves read-it,failure in read-it,",
+        "the top level,:cold,mission.esl:5,is taken inside,:cold in the top level,",
+    ] {
+        assert!(output.contains(said), "{said}\n{output}{errors}");
+    }
 }
 
 #[test]
