@@ -9,15 +9,17 @@ use esl_testing::{Setup, list, may_define_tests};
 fn rows(text: &str, settings: &InjectSettings, known: &[(&str, &str)]) -> Vec<String> {
     let program = compile(&[Source::new("faults.esl", text)]).program.expect("it compiles");
     let setup = Setup::default();
-    let known: KnownFailures =
-        known.iter().map(|(name, cause)| ((*name).into(), vec![Symbol::keyword(cause)])).collect();
+    let mut all_known = KnownFailures::new();
+    for (name, cause) in known {
+        all_known.entry((*name).into()).or_default().push(Symbol::keyword(cause));
+    }
     let tests = list(&program, &setup).expect("it runs");
     let names: Vec<Option<&str>> =
         if tests.is_empty() { vec![None] } else { tests.iter().map(|test| Some(&*test.name)).collect() };
     let mut all = Vec::new();
     for test in names {
         let subject = InjectionSubject { program: &program, test, seed: 0, setup: &setup };
-        let report = inject(&subject, &known, settings, &|_, _| ()).expect("it begins");
+        let report = inject(&subject, &all_known, settings, &|_, _| ()).expect("it begins");
         assert_eq!(report.problem, None);
         all.extend(report.rows.iter().map(|row| format!("{}: {}", row.name, row.outcome.text())));
     }
@@ -175,4 +177,82 @@ fn pairs_disturb_remedies() {
     has(&rows(&text, &settings, &known), &format!("{name}: DEADLOCK"));
     let only = InjectSettings { only: Some(name.into()), ..InjectSettings::default() };
     assert_eq!(rows(&text, &only, &known), [format!("{name}: DEADLOCK")]);
+}
+
+#[test]
+fn a_task_that_a_failure_ends_is_told() {
+    let text = format!("{WHEELS} (deftest drives (spawn (:name \"left\") (drive 5)) (sleep 9) (is t))");
+    let found = rows(&text, &InjectSettings::default(), &[("drive", "WHEEL-STUCK")]);
+    has(&found, "drive#1:wheel-stuck: recovered, a task failed");
+    has(&found, "drive#1:late: recovered");
+    // A form that waits for it takes its failure.
+    let text = format!(
+        "{WHEELS} (deftest drives (handler-case (or-parallel (left (drive 5))) (failure () 1)) (is t))"
+    );
+    let found = rows(&text, &InjectSettings::default(), &[("drive", "WHEEL-STUCK")]);
+    has(&found, "drive#1:wheel-stuck: recovered");
+}
+
+#[test]
+fn a_run_that_comes_to_its_end_may_leave_a_motor_on() {
+    let drive = |end: &str| {
+        let text = format!(
+            "{WHEELS} (deftest drives
+               (is (handler-case (progn (set-wheels :on) (drive 5) (set-wheels :off) t) (failure () {end}))))"
+        );
+        rows(&text, &InjectSettings::default(), &[("drive", "WHEEL-STUCK")])
+    };
+    has(&drive("t"), "drive#1:wheel-stuck: LEFT ON");
+    has(&drive("nil"), "drive#1:wheel-stuck: LEFT ON");
+    has(&drive("(exit 0)"), "drive#1:wheel-stuck: LEFT ON");
+    has(&drive("(set-wheels :off) t"), "drive#1:wheel-stuck: recovered");
+    has(&drive("(set-wheels :off) nil"), "drive#1:wheel-stuck: recovered otherwise");
+    has(&drive("(set-wheels :off) (exit 0)"), "drive#1:wheel-stuck: recovered otherwise");
+    has(&drive("(set-wheels :off) (exit 3)"), "drive#1:wheel-stuck: failed, cleanups run");
+}
+
+#[test]
+fn rows_with_odd_names_are_repeated_by_these() {
+    let text = "(define-cause :never ()) (define-cause :|a b| ()) (define-cause :|x/y#1:late| ())
+        (declaim (fails |op/b| :never :|a b|) (fails |Move| :|x/y#1:late|))
+        (define-mock |op/b| () (sleep 1)) (define-mock |Move| () (sleep 1)) (define-mock move () (sleep 1))
+        (deftest works (|op/b|) (|Move|) (move) (is t))";
+    let all =
+        rows(text, &InjectSettings::default(), &[("op/b", "NEVER"), ("op/b", "a b"), ("move", "x/y#1:late")]);
+    has(&all, "|op/b|#1::never: failed, cleanups run");
+    has(&all, "|op/b|#1:never: DEADLOCK");
+    has(&all, "|op/b|#1:|a b|: failed, cleanups run");
+    has(&all, "|Move|#1:|x/y#1:late|: failed, cleanups run");
+    has(&all, "move#1:late: recovered");
+    let known = [("op/b", "NEVER"), ("op/b", "a b"), ("move", "x/y#1:late")];
+    let again = |name: &str| {
+        let only = InjectSettings { only: Some(name.into()), ..InjectSettings::default() };
+        rows(text, &only, &known)
+    };
+    for row in &all {
+        let (name, _) = row.rsplit_once(": ").expect("an outcome follows");
+        assert_eq!(again(name), [row.as_str()]);
+    }
+    assert_eq!(
+        again("|op/b|#1:late/|Move|#1:|x/y#1:late|"),
+        ["|op/b|#1:late/|Move|#1:|x/y#1:late|: failed, cleanups run"]
+    );
+}
+
+#[test]
+fn calls_are_those_of_their_tasks() {
+    let text = format!(
+        "{WHEELS} (deftest drives (spawn (drive 1)) (spawn (:name \"left\") (drive 2)) (drive 3) (sleep 9) (is t))"
+    );
+    let program = compile(&[Source::new("faults.esl", text.as_str())]).program.expect("it compiles");
+    let subject =
+        InjectionSubject { program: &program, test: Some("DRIVES"), seed: 0, setup: &Setup::default() };
+    let report =
+        inject(&subject, &KnownFailures::new(), &InjectSettings::default(), &|_, _| ()).expect("it begins");
+    let mut tasks: Vec<&str> = report.rows.iter().map(|row| row.task.as_str()).collect();
+    tasks.sort_unstable();
+    tasks.dedup();
+    let [left, main, unnamed] = tasks[..] else { panic!("there are three: {tasks:?}") };
+    assert_eq!((left, main), ("left", "main"));
+    assert!(unnamed.starts_with("task "), "{unnamed}");
 }

@@ -1,8 +1,8 @@
 //! Faults: which call of which operation is disturbed, and how.
 
-use std::collections::BTreeMap;
 use std::fmt;
 
+use esl_analysis::shown_cause;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
@@ -29,14 +29,23 @@ pub enum FaultWay {
 }
 
 impl FaultWay {
-    /// Returns the name, as in the names of rows: the cause, or a word.
+    /// Returns the cause as a program has it, or a word.
     pub fn name(&self) -> String {
         match self {
-            FaultWay::Fails { cause, .. } => cause.to_string().to_lowercase(),
+            FaultWay::Fails { cause, .. } => shown_cause(cause),
             FaultWay::Never => "never".into(),
             FaultWay::Late(_) => "late".into(),
             FaultWay::Aborted => "aborted".into(),
         }
+    }
+
+    /// Returns the end of a row's name. A cause with the name of a word has two colons.
+    fn ending(&self) -> String {
+        let name = self.name();
+        let plain = name.strip_prefix(':').unwrap_or(&name);
+        let is_cause = matches!(self, FaultWay::Fails { .. });
+        let colons = if is_cause && ["never", "late", "aborted"].contains(&plain) { "::" } else { ":" };
+        on_one_line(&format!("{colons}{plain}"))
     }
 }
 
@@ -53,9 +62,19 @@ pub struct InjectedFault {
     pub way: FaultWay,
 }
 
-/// Returns the name of an operation, in lower case.
+/// Returns the name of an operation as a program has it.
+pub(super) fn shown_operation(operation: &Symbol) -> String {
+    on_one_line(&shown_cause(operation))
+}
+
+/// Returns the name of an operation in lower case, as tables of failures have it.
 pub(super) fn operation_name(operation: &Symbol) -> String {
     operation.name().to_lowercase()
+}
+
+/// Returns a text with blanks in the place of other white space and of control characters.
+pub(super) fn on_one_line(text: &str) -> String {
+    text.replace(|c: char| c.is_control() || c.is_whitespace(), " ")
 }
 
 impl fmt::Display for InjectedFault {
@@ -63,37 +82,40 @@ impl fmt::Display for InjectedFault {
     /// `slew#3+:never` if it lasts.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let lasts = if self.lasts { "+" } else { "" };
-        let way = self.way.name();
-        let colon = if way.starts_with(':') { "" } else { ":" };
-        write!(f, "{}#{}{lasts}{colon}{way}", operation_name(&self.operation), self.call)
+        write!(f, "{}#{}{lasts}{}", shown_operation(&self.operation), self.call, self.way.ending())
     }
+}
+
+/// Returns the first that is called `name`, or, if there is none, so in any case.
+fn find_named<T>(items: &[T], name: &str, shown: impl Fn(&T) -> String) -> Option<usize> {
+    let is_like = |item: &T| shown(item).to_lowercase() == name.to_lowercase();
+    items.iter().position(|item| shown(item) == name).or_else(|| items.iter().position(is_like))
 }
 
 impl InjectedFault {
     /// Returns the fault of this name: one of `all`, or one like them of a call that only a disturbed run
     /// makes.
     pub(super) fn named(name: &str, all: &[InjectedFault], ways: &FailureWays) -> Option<InjectedFault> {
-        let name = name.to_lowercase();
-        let (operation, rest) = name.split_once('#')?;
-        let (call, way) = rest.split_once(':')?;
-        let lasts = call.ends_with('+');
-        let call = call.trim_end_matches('+').parse().ok()?;
-        let like = all.iter().find(|fault| operation_name(&fault.operation) == operation);
-        let symbol = match like {
-            Some(fault) => fault.operation.clone(),
-            None => ways.symbol_of(operation)?,
-        };
-        let failing = ways
-            .of(operation)
-            .iter()
-            .map(|(cause, arguments)| FaultWay::Fails { cause: cause.clone(), arguments: arguments.clone() });
-        let delay = all
-            .iter()
-            .find(|fault| fault.operation == symbol && fault.call == call && fault.way.name() == "late");
-        let late = delay.map_or(FaultWay::Late(LEAST_DELAY), |fault| fault.way.clone());
-        let mut known = failing.chain([FaultWay::Never, late, FaultWay::Aborted]);
-        let way = known.find(|known| known.name().trim_start_matches(':') == way)?;
-        Some(InjectedFault { operation: symbol, call, lasts, way })
+        let name = on_one_line(name);
+        // Names of operations and causes may have these signs, too.
+        name.match_indices('#').find_map(|(place, _)| {
+            let (operation, rest) = (&name[..place], &name[place + 1..]);
+            let digits = rest.find(|c: char| !c.is_ascii_digit())?;
+            let call = rest[..digits].parse().ok()?;
+            let (lasts, way) = match rest[digits..].strip_prefix('+') {
+                Some(way) => (true, way),
+                None => (false, &rest[digits..]),
+            };
+            let operation = ways.symbol_of(operation, all)?;
+            let delay = all.iter().find(|fault| {
+                fault.operation == operation && fault.call == call && matches!(fault.way, FaultWay::Late(_))
+            });
+            let late = delay.map_or(FaultWay::Late(LEAST_DELAY), |fault| fault.way.clone());
+            let mut known: Vec<FaultWay> = ways.failing(&operation).collect();
+            known.extend([FaultWay::Never, late, FaultWay::Aborted]);
+            let place = find_named(&known, way, FaultWay::ending)?;
+            Some(InjectedFault { operation, call, lasts, way: known.swap_remove(place) })
+        })
     }
 
     /// Returns the fault as the library takes it.
@@ -143,9 +165,10 @@ type KnownFailure = (Symbol, Vec<Datum>);
 /// The failures of each operation, with their arguments as far as a run has shown them.
 #[derive(Default)]
 pub(super) struct FailureWays {
-    causes: BTreeMap<String, Vec<KnownFailure>>,
+    seen: Vec<(Symbol, Vec<KnownFailure>)>,
+    known: KnownFailures,
     /// Operations that runs have called.
-    symbols: BTreeMap<String, Symbol>,
+    called: Vec<Symbol>,
 }
 
 impl FailureWays {
@@ -165,7 +188,9 @@ impl FailureWays {
     /// Notes the operations that a run calls.
     pub(super) fn note_operations(&mut self, run: &InjectedRun) {
         for call in &run.calls {
-            self.symbols.insert(operation_name(&call.operation), call.operation.clone());
+            if !self.called.contains(&call.operation) {
+                self.called.push(call.operation.clone());
+            }
         }
     }
 
@@ -173,33 +198,47 @@ impl FailureWays {
         let Some((cause, arguments)) = failure.split_first() else { return };
         let Some(cause) = cause.as_symbol() else { return };
         // A call outside of any world fails so; it is not a fault of the outside.
-        let is_of_world = cause.name() == "NOT-IN-THIS-WORLD";
-        let ways = self.causes.entry(operation_name(operation)).or_default();
-        if is_of_world || ways.iter().any(|(known, _)| known == cause) {
+        if cause.name() == "NOT-IN-THIS-WORLD" {
             return;
         }
-        let arguments = if arguments.iter().all(is_plain) { arguments.to_vec() } else { Vec::new() };
-        ways.push((cause.clone(), arguments));
+        let place = match self.seen.iter().position(|(known, _)| known == operation) {
+            Some(place) => place,
+            None => {
+                self.seen.push((operation.clone(), Vec::new()));
+                self.seen.len() - 1
+            }
+        };
+        let ways = &mut self.seen[place].1;
+        if !ways.iter().any(|(known, _)| known == cause) {
+            let arguments = if arguments.iter().all(is_plain) { arguments.to_vec() } else { Vec::new() };
+            ways.push((cause.clone(), arguments));
+        }
     }
 
     /// Adds the failures that are known without a run.
     pub(super) fn add_known(&mut self, known: &KnownFailures) {
         for (operation, causes) in known {
-            let ways = self.causes.entry(operation.clone()).or_default();
-            for cause in causes {
-                if !ways.iter().any(|(other, _)| other == cause) {
-                    ways.push((cause.clone(), Vec::new()));
-                }
-            }
+            self.known.entry(operation.clone()).or_default().extend(causes.iter().cloned());
         }
     }
 
-    fn symbol_of(&self, operation: &str) -> Option<Symbol> {
-        self.symbols.get(operation).cloned()
+    /// Returns the operation of this name.
+    fn symbol_of(&self, name: &str, all: &[InjectedFault]) -> Option<Symbol> {
+        let operations: Vec<&Symbol> = all.iter().map(|fault| &fault.operation).chain(&self.called).collect();
+        let place = find_named(&operations, name, |operation| shown_operation(operation))?;
+        Some(operations[place].clone())
     }
 
-    fn of(&self, operation: &str) -> &[KnownFailure] {
-        self.causes.get(operation).map_or(&[], Vec::as_slice)
+    /// Returns the ways in which an operation fails.
+    fn failing(&self, operation: &Symbol) -> impl Iterator<Item = FaultWay> {
+        let seen = self.seen.iter().find(|(known, _)| known == operation);
+        let mut failures: Vec<KnownFailure> = seen.map(|(_, ways)| ways.clone()).unwrap_or_default();
+        for cause in self.known.get(&operation_name(operation)).into_iter().flatten() {
+            if !failures.iter().any(|(other, _)| other == cause) {
+                failures.push((cause.clone(), Vec::new()));
+            }
+        }
+        failures.into_iter().map(|(cause, arguments)| FaultWay::Fails { cause, arguments })
     }
 }
 
@@ -209,17 +248,16 @@ pub(super) fn faults(
     ways: &FailureWays,
     settings: &InjectSettings,
 ) -> (Vec<InjectedFault>, usize) {
-    let mut operations: Vec<(String, Vec<&NotedCall>)> = Vec::new();
+    let mut operations: Vec<(&Symbol, Vec<&NotedCall>)> = Vec::new();
     for call in calls {
-        let name = operation_name(&call.operation);
-        match operations.iter_mut().find(|(known, _)| *known == name) {
+        match operations.iter_mut().find(|(known, _)| **known == call.operation) {
             Some((_, calls)) => calls.push(call),
-            None => operations.push((name, vec![call])),
+            None => operations.push((&call.operation, vec![call])),
         }
     }
     let mut faults = Vec::new();
     let mut tried = 0;
-    for (name, calls) in &operations {
+    for (operation, calls) in &operations {
         for (place, call) in spread(calls, settings.calls).into_iter().enumerate() {
             tried += 1;
             let fault = |way, lasts| InjectedFault {
@@ -228,8 +266,7 @@ pub(super) fn faults(
                 lasts,
                 way,
             };
-            for (cause, arguments) in ways.of(name) {
-                let way = FaultWay::Fails { cause: cause.clone(), arguments: arguments.clone() };
+            for way in ways.failing(operation) {
                 faults.push(fault(way.clone(), false));
                 if place == 0 {
                     faults.push(fault(way, true));
@@ -268,11 +305,7 @@ pub(super) fn pairs(
 ) -> (Vec<Vec<InjectedFault>>, usize) {
     let mut of_remedies = Vec::new();
     for (fault, call) in remedies {
-        let failing = ways
-            .of(&operation_name(&call.operation))
-            .iter()
-            .map(|(cause, arguments)| FaultWay::Fails { cause: cause.clone(), arguments: arguments.clone() });
-        for way in failing.chain([FaultWay::Never]) {
+        for way in ways.failing(&call.operation).chain([FaultWay::Never]) {
             let second =
                 InjectedFault { operation: call.operation.clone(), call: call.number, lasts: false, way };
             of_remedies.push(vec![fault.clone(), second]);
@@ -325,5 +358,8 @@ mod tests {
         let cause = Symbol::keyword("WHEEL-STUCK");
         let fails = FaultWay::Fails { cause, arguments: Vec::new() };
         assert_eq!(fault(true, fails).to_string(), "slew#3+:wheel-stuck");
+        let fails = |name: &str| FaultWay::Fails { cause: Symbol::keyword(name), arguments: Vec::new() };
+        assert_eq!(fault(false, fails("NEVER")).to_string(), "slew#3::never");
+        assert_eq!(fault(false, fails("a\nb")).to_string(), "slew#3:|a b|");
     }
 }

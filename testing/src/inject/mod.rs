@@ -198,14 +198,18 @@ pub fn inject(
     ways.add_known(known);
     let (single, tried) = faults(&undisturbed.calls, &ways, settings);
     report.tried = tried;
-    // The second of two faults may disturb an operation that only a run with the first one calls.
-    if let Some((first, _)) = settings.only.as_ref().and_then(|only| only.split_once('/'))
-        && let Some(fault) = named(first, settings, &undisturbed, &ways).first()
-    {
-        ways.note_operations(&Runs::new(subject, subject.seed).run(fault, bound, false)?);
-    }
     let wanted = match &settings.only {
-        Some(only) => named(only, settings, &undisturbed, &ways),
+        Some(only) => {
+            // The second of two faults may disturb an operation that only a run with the first one calls.
+            if named(only, settings, &undisturbed, &ways).is_empty() {
+                for (first, _) in halves(only) {
+                    if let Some(fault) = named(first, settings, &undisturbed, &ways).first() {
+                        ways.note_operations(&Runs::new(subject, subject.seed).run(fault, bound, false)?);
+                    }
+                }
+            }
+            named(only, settings, &undisturbed, &ways)
+        }
         None => single.iter().map(|fault| vec![fault.clone()]).collect(),
     };
     let run =
@@ -232,9 +236,14 @@ fn named(
 ) -> Vec<Vec<InjectedFault>> {
     let every = InjectSettings { calls: usize::MAX, ..settings.clone() };
     let (all, _) = faults(&undisturbed.calls, ways, &every);
-    let parts: Option<Vec<InjectedFault>> =
-        name.split('/').map(|part| InjectedFault::named(part.trim(), &all, ways)).collect();
-    parts.into_iter().collect()
+    let one = |part: &str| InjectedFault::named(part.trim(), &all, ways);
+    let two = || halves(name).find_map(|(first, second)| Some(vec![one(first)?, one(second)?]));
+    one(name).map(|fault| vec![fault]).or_else(two).into_iter().collect()
+}
+
+/// Returns the halves of a text at each `/`: one may be in the name of an operation or a cause.
+fn halves(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    text.match_indices('/').map(|(place, _)| (&text[..place], &text[place + 1..]))
 }
 
 /// Makes the runs, several at a time, and returns their rows in the order of `wanted`.
@@ -292,7 +301,7 @@ fn remedies(faults: &[InjectedFault], run: &InjectedRun, undisturbed: &InjectedR
     }
     let known = counts(&undisturbed.calls);
     let is_first_new = |call: &&NotedCall| {
-        let before = known.get(&fault::operation_name(&call.operation)).copied().unwrap_or(0);
+        let before = known.get(&fault::shown_operation(&call.operation)).copied().unwrap_or(0);
         call.number == before as u64 + 1
     };
     run.calls.iter().filter(is_first_new).map(|call| (fault.clone(), call.clone())).collect()

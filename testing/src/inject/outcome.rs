@@ -3,7 +3,7 @@
 use esl::program::Ended;
 
 use super::RunBound;
-use super::properties::left;
+use super::properties::{left, still_on};
 use super::run::InjectedRun;
 use crate::{ALL_HELD, NO_CHECK, ONE_DID_NOT_HOLD, WITHOUT_CHECK};
 
@@ -14,11 +14,14 @@ pub enum FaultOutcome {
     SameResult,
     /// It comes to its end, with another result.
     OtherResult,
+    /// It comes to its end, and a failure has ended a task for which no form waits.
+    TaskFailed,
     /// A failure or an abort ends it, or it says by its status that it has failed; all cleanups have run.
     Failed,
     /// A condition of `always` was false.
     Violated,
-    /// It has ended, and a property has a value with which neither the undisturbed run ends nor begins.
+    /// A failure has ended it, and a property has a value with which neither the undisturbed run ends nor
+    /// begins; or it has come to its end, and a property is not `:off` that is so after the undisturbed run.
     LeftOn,
     /// A cleanup was cut off.
     CleanupCutOff,
@@ -34,9 +37,10 @@ pub enum FaultOutcome {
 
 impl FaultOutcome {
     /// All of them, the good ones first.
-    pub const ALL: [FaultOutcome; 10] = [
+    pub const ALL: [FaultOutcome; 11] = [
         FaultOutcome::SameResult,
         FaultOutcome::OtherResult,
+        FaultOutcome::TaskFailed,
         FaultOutcome::Failed,
         FaultOutcome::NotReached,
         FaultOutcome::Violated,
@@ -52,6 +56,7 @@ impl FaultOutcome {
         match self {
             FaultOutcome::SameResult => "recovered",
             FaultOutcome::OtherResult => "recovered otherwise",
+            FaultOutcome::TaskFailed => "recovered, a task failed",
             FaultOutcome::Failed => "failed, cleanups run",
             FaultOutcome::Violated => "INVARIANT FALSE",
             FaultOutcome::LeftOn => "LEFT ON",
@@ -97,18 +102,31 @@ pub(super) fn judge(
     if let Some(report) = &run.cut_off {
         return (FaultOutcome::CleanupCutOff, report.clone());
     }
+    let comes_to_its_end = run.ended == undisturbed.ended
+        || is_test && matches!(run.ended, Ended::Normally(0 | ONE_DID_NOT_HOLD));
+    let on = if comes_to_its_end { still_on(&run.properties, &undisturbed.properties) } else { Vec::new() };
+    if !on.is_empty() {
+        return (FaultOutcome::LeftOn, on.join("; "));
+    }
     if run.ended == undisturbed.ended {
         let differences = differences(run, undisturbed);
-        let outcome = match differences.is_empty() {
-            true => FaultOutcome::SameResult,
-            false => FaultOutcome::OtherResult,
+        let failed = failed_tasks(run, undisturbed);
+        let outcome = match (failed.is_empty(), differences.is_empty()) {
+            (false, _) => FaultOutcome::TaskFailed,
+            (true, false) => FaultOutcome::OtherResult,
+            (true, true) => FaultOutcome::SameResult,
         };
-        return (outcome, differences);
+        let parts: Vec<String> =
+            failed.into_iter().chain([differences]).filter(|part| !part.is_empty()).collect();
+        return (outcome, parts.join("; "));
     }
     if is_test && run.ended == Ended::Normally(ONE_DID_NOT_HOLD) {
         let line = run.errors.lines().find(|line| line.ends_with(" is false."));
         let line = line.map_or(String::new(), |line| format!(": {line}"));
         return (FaultOutcome::OtherResult, format!("a check did not hold{line}"));
+    }
+    if is_test && run.ended == Ended::Normally(0) {
+        return (FaultOutcome::OtherResult, "the program exits before the end of the test".into());
     }
     let left = left(&run.properties, &undisturbed.first, &undisturbed.properties);
     if !left.is_empty() {
@@ -157,10 +175,63 @@ fn waits(errors: &str) -> String {
     lines.join("; ")
 }
 
-/// Returns the first line about a failure.
+/// Report of a failure that has ended a task.
+struct FailureReport {
+    /// What the machine calls the task; `None` for the main task.
+    task: Option<String>,
+    /// Text of the failure, on one line.
+    message: String,
+    cause: String,
+}
+
+/// Returns the reports of failures in the text of a run's errors.
+fn failure_reports(errors: &str) -> Vec<FailureReport> {
+    let mut reports = Vec::new();
+    let (mut task, mut message, mut is_said) = (None, Vec::new(), false);
+    for line in errors.lines() {
+        let begun = line.strip_prefix("In ").and_then(|rest| rest.split_once(", begun at "));
+        if let (Some((name, _)), true) = (begun, line.ends_with(':')) {
+            (task, message, is_said) = (Some(name.to_string()), Vec::new(), false);
+        } else if let Some(cause) =
+            line.strip_prefix("Failure ").and_then(|rest| rest.strip_suffix(", no recovery available."))
+        {
+            let text = std::mem::take(&mut message).join(" ");
+            reports.push(FailureReport { task: task.take(), message: text, cause: cause.to_lowercase() });
+            is_said = false;
+        } else if line.starts_with("  in ") {
+            is_said = true;
+        } else if line.starts_with("A failure") || line == "Aborted" {
+            message = if line == "Aborted" { Vec::new() } else { vec![line] };
+        } else if !is_said {
+            message.push(line);
+        }
+    }
+    reports
+}
+
+/// Returns texts about the tasks that failures have ended, beyond those of the undisturbed run.
+fn failed_tasks(run: &InjectedRun, undisturbed: &InjectedRun) -> Vec<String> {
+    let texts = |run: &InjectedRun| -> Vec<String> {
+        let reports = failure_reports(&run.errors).into_iter();
+        reports.filter_map(|report| Some(format!("{} ended by {}", report.task?, report.cause))).collect()
+    };
+    let known = texts(undisturbed);
+    let mut new: Vec<String> = Vec::new();
+    for text in texts(run) {
+        if !known.contains(&text) && !new.contains(&text) {
+            new.push(text);
+        }
+    }
+    new
+}
+
+/// Returns the text of the failure that has ended a run.
 fn reason(errors: &str) -> String {
-    let first = errors.lines().find(|line| line.starts_with("A failure")).or_else(|| errors.lines().next());
-    first.unwrap_or("aborted").to_string()
+    let reports = failure_reports(errors);
+    match reports.iter().find(|report| report.task.is_none()) {
+        Some(report) if !report.message.is_empty() => report.message.clone(),
+        _ => errors.lines().next().unwrap_or("aborted").to_string(),
+    }
 }
 
 /// Most differences that are shown.
@@ -180,4 +251,21 @@ fn differences(run: &InjectedRun, undisturbed: &InjectedRun) -> String {
         shown.push("other output".into());
     }
     shown.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reports_are_told_apart() {
+        let errors = "In task \"W\", begun at a.esl:5:22:\nA failure of cause :STUCK.\n  in (SPAWN), a.esl:5:22\n\
+                      Failure :STUCK, no recovery available.\nAborted\ntwo\nlines\n  in top level, a.esl:7:1\n\
+                      Failure :SIMPLE-ERROR, no recovery available.\nAborted\n";
+        let reports = failure_reports(errors);
+        let [first, second] = &reports[..] else { panic!("there are two") };
+        assert_eq!((first.task.as_deref(), first.cause.as_str()), (Some("task \"W\""), ":stuck"));
+        assert_eq!((second.task.as_deref(), second.message.as_str()), (None, "two lines"));
+        assert_eq!(reason(errors), "two lines");
+    }
 }

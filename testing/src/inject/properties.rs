@@ -60,6 +60,13 @@ pub(super) fn left(now: &PropertyValues, first: &PropertyValues, last: &Property
     now.iter().filter(is_left).map(row).collect()
 }
 
+/// Returns texts about the properties that are `:off` after the undisturbed run, and not so now.
+pub(super) fn still_on(now: &PropertyValues, last: &PropertyValues) -> Vec<String> {
+    let is_off = |key: &String| last.get(key).is_some_and(|rest| rest == ":OFF");
+    let row = |(key, value): (&String, &String)| format!("({key}) is {value}, not :off").to_lowercase();
+    now.iter().filter(|(key, value)| is_off(key) && *value != ":OFF").map(row).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

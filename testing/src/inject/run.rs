@@ -293,7 +293,7 @@ fn text(datum: &Datum) -> String {
 pub(super) fn counts(calls: &[NotedCall]) -> BTreeMap<String, usize> {
     let mut counts = BTreeMap::new();
     for call in calls {
-        *counts.entry(super::fault::operation_name(&call.operation)).or_insert(0) += 1;
+        *counts.entry(super::fault::shown_operation(&call.operation)).or_insert(0) += 1;
     }
     counts
 }

@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
+use esl_analysis::render::markdown_cell;
 use serde_json::{Value, json};
 
+use super::fault::on_one_line;
 use super::{FaultOutcome, InjectedRow, InjectionReport};
 
 /// Form of a table.
@@ -55,7 +57,7 @@ pub fn render(reports: &[(String, InjectionReport)], format: InjectFormat) -> St
 fn ending(row: &InjectedRow) -> String {
     match row.detail.as_str() {
         "" => row.outcome.text().into(),
-        detail => format!("{}: {detail}", row.outcome.text()),
+        detail => format!("{}: {}", row.outcome.text(), on_one_line(detail)),
     }
 }
 
@@ -154,7 +156,7 @@ fn cells(reports: &[(String, InjectionReport)]) -> Vec<[String; 12]> {
 }
 
 fn csv(reports: &[(String, InjectionReport)]) -> String {
-    let cell = |text: &str| match text.contains([',', '"', '\n']) {
+    let cell = |text: &str| match text.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),
         false => text.to_string(),
     };
@@ -168,7 +170,7 @@ fn csv(reports: &[(String, InjectionReport)]) -> String {
 fn markdown(reports: &[(String, InjectionReport)]) -> String {
     let mut text = format!("| {} |\n|{}\n", HEADINGS.join(" | "), " --- |".repeat(HEADINGS.len()));
     for row in cells(reports) {
-        let row: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|").replace('<', "&lt;")).collect();
+        let row: Vec<String> = row.iter().map(|cell| markdown_cell(cell)).collect();
         _ = writeln!(text, "| {} |", row.join(" | "));
     }
     text
