@@ -9,7 +9,7 @@ use esl_compiler::core::{Callee, NodeId, NodeKind};
 use esl_compiler::diagnostic::Sources;
 
 use crate::cause::{Applies, clause_applies, is_above_cause, is_of_mistake, shown_cause};
-use crate::forms::{CoreForm, CoreForms, DeclaredCauses, is_esl, symbols_inside};
+use crate::forms::{CoreForm, CoreForms, is_esl, symbols_inside};
 use crate::guard::LeavingFailures;
 use crate::is_of_program;
 use crate::row::{CodePlace, FailingTask, FailureTable};
@@ -18,6 +18,28 @@ use crate::value::TaskKind;
 
 /// Beginning of the names of the tasks in which scripts of worlds answer.
 pub(crate) const SCRIPTED: &str = "scripted ";
+
+/// The declarations `(fails name cause*)` of a name, which add up.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DeclaredCauses {
+    pub(crate) causes: Vec<Symbol>,
+    /// Form and node of each declaration, with its causes.
+    pub(crate) parts: Vec<((usize, NodeId), Vec<Symbol>)>,
+}
+
+impl DeclaredCauses {
+    pub(crate) fn add(&mut self, place: (usize, NodeId), causes: Vec<Symbol>) {
+        let new = causes.iter().filter(|cause| !self.causes.contains(cause)).cloned();
+        let new: Vec<Symbol> = new.collect();
+        self.causes.extend(new);
+        self.parts.push((place, causes));
+    }
+
+    /// Returns form and node of the first declaration.
+    pub(crate) fn place(&self) -> (usize, NodeId) {
+        self.parts.first().map_or((0, NodeId(0)), |(place, _)| *place)
+    }
+}
 
 impl FailureTable {
     /// Returns the known causes of failures of functions and operations, such as `:timeout`, by the names of

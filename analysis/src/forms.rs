@@ -10,6 +10,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::cause::is_mistake;
 use crate::clause::{Clause, can_end, clauses_of};
+use crate::declared::DeclaredCauses;
 
 /// A form that handles failures, or a part of a program that is looked at by itself, such as a clause.
 #[derive(Clone, Debug)]
@@ -286,28 +287,6 @@ fn leaving_handlers(core: &Core, list: NodeId) -> Vec<Datum> {
         (!ends).then(|| condition_type.clone())
     });
     leaving.collect()
-}
-
-/// The declarations `(fails name cause*)` of a name, which add up.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct DeclaredCauses {
-    pub(crate) causes: Vec<Symbol>,
-    /// Form and node of each declaration, with its causes.
-    pub(crate) parts: Vec<((usize, NodeId), Vec<Symbol>)>,
-}
-
-impl DeclaredCauses {
-    pub(crate) fn add(&mut self, place: (usize, NodeId), causes: Vec<Symbol>) {
-        let new = causes.iter().filter(|cause| !self.causes.contains(cause)).cloned();
-        let new: Vec<Symbol> = new.collect();
-        self.causes.extend(new);
-        self.parts.push((place, causes));
-    }
-
-    /// Returns form and node of the first declaration.
-    pub(crate) fn place(&self) -> (usize, NodeId) {
-        self.parts.first().map_or((0, NodeId(0)), |(place, _)| *place)
-    }
 }
 
 /// The forms of a program, and its definitions at fixed places.
