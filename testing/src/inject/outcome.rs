@@ -176,28 +176,36 @@ fn waits(errors: &str) -> String {
 }
 
 /// Report of a failure that has ended a task.
-struct FailureReport {
-    /// What the machine calls the task; `None` for the main task.
+struct EndedTaskReport {
+    /// Name of the task in reports; `None` for the main task.
     task: Option<String>,
     /// Text of the failure, on one line.
     message: String,
     cause: String,
 }
 
+/// End of a report after the cause.
+const UNHANDLED: &str = ", no recovery available.";
+
 /// Returns the reports of failures in the text of a run's errors.
-fn failure_reports(errors: &str) -> Vec<FailureReport> {
+fn failure_reports(errors: &str) -> Vec<EndedTaskReport> {
     let mut reports = Vec::new();
-    let (mut task, mut message, mut is_said) = (None, Vec::new(), false);
+    let (mut task, mut message, mut is_said, mut failing) = (None, Vec::new(), false, None);
     for line in errors.lines() {
         let begun = line.strip_prefix("In ").and_then(|rest| rest.split_once(", begun at "));
         if let (Some((name, _)), true) = (begun, line.ends_with(':')) {
             (task, message, is_said) = (Some(name.to_string()), Vec::new(), false);
-        } else if let Some(cause) =
-            line.strip_prefix("Failure ").and_then(|rest| rest.strip_suffix(", no recovery available."))
-        {
-            let text = std::mem::take(&mut message).join(" ");
-            reports.push(FailureReport { task: task.take(), message: text, cause: cause.to_lowercase() });
-            is_said = false;
+        } else if failing.is_some() || line.starts_with("Failure ") {
+            // A cause may have several lines.
+            let cause = failing.take().map_or_else(|| line.to_string(), |cause| format!("{cause} {line}"));
+            match cause.strip_prefix("Failure ").and_then(|cause| cause.strip_suffix(UNHANDLED)) {
+                Some(cause) => {
+                    let (message, cause) = (std::mem::take(&mut message).join(" "), cause.to_lowercase());
+                    reports.push(EndedTaskReport { task: task.take(), message, cause });
+                    is_said = false;
+                }
+                None => failing = Some(cause),
+            }
         } else if line.starts_with("  in ") {
             is_said = true;
         } else if line.starts_with("A failure") || line == "Aborted" {
@@ -261,11 +269,12 @@ mod tests {
     fn reports_are_told_apart() {
         let errors = "In task \"W\", begun at a.esl:5:22:\nA failure of cause :STUCK.\n  in (SPAWN), a.esl:5:22\n\
                       Failure :STUCK, no recovery available.\nAborted\ntwo\nlines\n  in top level, a.esl:7:1\n\
-                      Failure :SIMPLE-ERROR, no recovery available.\nAborted\n";
+                      Failure :|a\nb|, no recovery available.\nAborted\n";
         let reports = failure_reports(errors);
         let [first, second] = &reports[..] else { panic!("there are two") };
         assert_eq!((first.task.as_deref(), first.cause.as_str()), (Some("task \"W\""), ":stuck"));
         assert_eq!((second.task.as_deref(), second.message.as_str()), (None, "two lines"));
+        assert_eq!(second.cause, ":|a b|");
         assert_eq!(reason(errors), "two lines");
     }
 }
