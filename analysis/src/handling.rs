@@ -8,6 +8,7 @@ use crate::forms::ScopeKind;
 use crate::guard::{FailureId, LeavingFailures};
 use crate::row::HandlingForm;
 use crate::table::Maker;
+use crate::value::Code;
 
 impl Maker<'_, '_> {
     /// Returns the forms of the program's own sources that handle failures.
@@ -17,11 +18,14 @@ impl Maker<'_, '_> {
         struct BodyFailures {
             arriving: LeavingFailures,
             taken: FxHashSet<FailureId>,
+            codes: Vec<Code>,
         }
 
         let mut groups: BTreeMap<(u32, usize), BodyFailures> = BTreeMap::new();
         for ((number, scope), handled) in &self.solution.handled {
-            let group = groups.entry((self.flow.running[*number].code.form, *scope)).or_default();
+            let code = self.flow.running[*number].code;
+            let group = groups.entry((code.form, *scope)).or_default();
+            group.codes.push(code);
             group.arriving.add(&handled.arriving);
             group.taken.extend(handled.taken.iter().flatten().map(|(failure, _)| *failure));
         }
@@ -45,8 +49,8 @@ impl Maker<'_, '_> {
             rows.push(HandlingForm {
                 place,
                 span: text.core.nodes[node.index()].span,
-                taken: self.rows(taken, 0),
-                passing: self.rows(passing, 0),
+                taken: self.rows(taken, 0, &group.codes),
+                passing: self.rows(passing, 0, &group.codes),
             });
         }
         rows.sort_by(|left, right| left.place.cmp(&right.place));

@@ -22,6 +22,7 @@ mod effect;
 mod evaluate;
 mod explain;
 mod flow;
+mod folded;
 mod forms;
 mod goals;
 mod guard;
@@ -53,6 +54,7 @@ use esl_compiler::diagnostic::Sources;
 
 use effect::{FailureKind, NodeEffect, Reason};
 use flow::ValueFlow;
+use folded::FoldedModules;
 use forms::CoreForms;
 use table::Maker;
 use value::{Code, NO_CONTEXT};
@@ -103,7 +105,8 @@ pub fn analyze(cores: Vec<Core>, sources: &Sources, options: &AnalysisOptions) -
     }
     let solution = solve::solve(&flow);
     let numbers = table::numbers_of(&flow);
-    let maker = Maker { flow: &flow, solution: &solution, sources, all: options.all, numbers };
+    let folded = FoldedModules::new(&flow, &solution, of_modules(&forms, sources));
+    let maker = Maker { flow: &flow, solution: &solution, folded, sources, all: options.all, numbers };
     let explanation = options.explained.as_ref().map(|cause| maker.explain(cause)).unwrap_or_default();
     let mut table = maker.table();
     table.findings.extend(findings);
@@ -174,6 +177,12 @@ fn solved<'a>(forms: &'a CoreForms, sources: Option<&Sources>) -> Option<ValueFl
         }
         (!flow.was_given_up()).then_some(flow)
     })
+}
+
+/// Returns of each form whether it is of a module that comes with the system.
+fn of_modules(forms: &CoreForms, sources: &Sources) -> Vec<bool> {
+    let spans = forms.forms.iter().map(|form| form.core.nodes.first().map(|node| node.span));
+    spans.map(|span| span.is_some_and(|span| !is_of_program(sources, span))).collect()
 }
 
 /// Returns whether a place is in the program, not in a module that comes with the system.

@@ -1,5 +1,6 @@
 //! The table: which failures leave each function and each task, and which clauses take which.
 
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use esl_bytecode::compile::MODULE_SOURCES;
@@ -13,6 +14,7 @@ use crate::cause::{MISTAKES, cause_of_condition, shown_cause};
 use crate::declared::{SCRIPTED, declared};
 use crate::effect::{FailureKind, Reason, mistake};
 use crate::flow::ValueFlow;
+use crate::folded::FoldedModules;
 use crate::forms::{CoreForms, ScopeKind};
 use crate::guard::{FailureId, LeavingFailures};
 use crate::row::{CauseRow, CodePlace, FailingTask, FailureOrigin, FailureTable, FunctionRow};
@@ -23,6 +25,7 @@ use crate::value::{Code, NO_CONTEXT, TaskKind, WorkKey};
 pub(crate) struct Maker<'m, 'f> {
     pub(crate) flow: &'m ValueFlow<'f>,
     pub(crate) solution: &'m Solution,
+    pub(crate) folded: FoldedModules,
     pub(crate) sources: &'m Sources,
     /// Whether programming errors are listed.
     pub(crate) all: bool,
@@ -140,19 +143,40 @@ impl Maker<'_, '_> {
         }
     }
 
-    /// Returns rows of failures, by their causes.
-    pub(crate) fn rows(&self, failures: impl IntoIterator<Item = FailureId>, mistakes: u8) -> Vec<CauseRow> {
+    fn origin(&self, form: u32, node: NodeId) -> FailureOrigin {
+        let text = &self.flow.forms.forms[form as usize];
+        let span = text.core.nodes[node.index()].span;
+        FailureOrigin {
+            place: self.place(form, node),
+            function: self.function_around(form, text.owners[node.index()]),
+            range: (span.source.0, span.start, span.end),
+        }
+    }
+
+    /// Returns rows of failures, by their causes. Those that begin in modules begin where code that `codes`
+    /// reach calls these.
+    pub(crate) fn rows(
+        &self,
+        failures: impl IntoIterator<Item = FailureId>,
+        mistakes: u8,
+        codes: &[Code],
+    ) -> Vec<CauseRow> {
         let mut by_cause: BTreeMap<String, (Option<Symbol>, BTreeSet<FailureOrigin>)> = BTreeMap::new();
+        let reached = OnceCell::new();
         for failure in failures {
             let failing = self.solution.failures.keys[failure as usize];
-            let form = &self.flow.forms.forms[failing.form as usize];
-            let function = self.function_around(failing.form, form.owners[failing.node.index()]);
-            let span = form.core.nodes[failing.node.index()].span;
-            let place = self.place(failing.form, failing.node);
-            let origin = FailureOrigin { place, function, range: (span.source.0, span.start, span.end) };
             let entry = by_cause.entry(self.cause(failing.kind)).or_default();
             entry.0 = self.name_of_cause(failing.kind);
-            entry.1.insert(origin);
+            let mut places: FxHashSet<(u32, NodeId)> = FxHashSet::default();
+            if self.folded.is_of_module(failing.form) {
+                let reached = reached.get_or_init(|| self.reach(codes.to_vec()));
+                let entries = self.folded.entries(failure, reached);
+                places.extend(entries.map(|(number, node)| (self.flow.running[number].code.form, node)));
+            }
+            if places.is_empty() {
+                places.insert((failing.form, failing.node));
+            }
+            entry.1.extend(places.into_iter().map(|(form, node)| self.origin(form, node)));
         }
         let row = |(cause, (name, origins)): (String, (Option<Symbol>, BTreeSet<FailureOrigin>))| CauseRow {
             cause,
@@ -179,8 +203,8 @@ impl Maker<'_, '_> {
         rows
     }
 
-    pub(crate) fn rows_of(&self, leaving: &LeavingFailures) -> Vec<CauseRow> {
-        self.rows(leaving.failures.iter().copied(), leaving.mistakes)
+    pub(crate) fn rows_of(&self, leaving: &LeavingFailures, codes: &[Code]) -> Vec<CauseRow> {
+        self.rows(leaving.failures.iter().copied(), leaving.mistakes, codes)
     }
 
     /// Whether a source is one of the program's own, not of a module that comes with the system.
@@ -226,7 +250,7 @@ impl Maker<'_, '_> {
             }
             let Some(leaving) = self.leaving_of(*form as u32, *node) else { continue };
             let causes =
-                self.rows(leaving.failures.iter().copied(), 0).into_iter().filter_map(|row| row.name);
+                self.rows(leaving.failures.iter().copied(), 0, &[]).into_iter().filter_map(|row| row.name);
             rows.entry(shown_function(name)).or_default().extend(causes);
         }
         rows.retain(|_, causes| !causes.is_empty());
@@ -244,7 +268,7 @@ impl Maker<'_, '_> {
             let lambda = self.lambda_defined(*form, *node);
             let fails_as_arguments =
                 lambda.is_some_and(|lambda| self.flow.calls_arguments.contains(&(*form as u32, lambda.0)));
-            let causes = self.rows_of(&leaving);
+            let causes = self.rows_of(&leaving, &self.codes_of(*form as u32, *node));
             let span = self.flow.forms.forms[*form].core.nodes[node.index()].span;
             let last = Span { start: span.end.saturating_sub(1).max(span.start), ..span };
             let last_line = self.sources.place(last).map_or(place.line, |place| place.line);
@@ -280,6 +304,13 @@ impl Maker<'_, '_> {
             all.add(&self.solution.leaving[*number]);
         }
         Some(all)
+    }
+
+    /// Returns the code of the function that a node defines.
+    fn codes_of(&self, form: u32, node: NodeId) -> Vec<Code> {
+        let lambda = self.lambda_defined(form as usize, node);
+        let numbers = lambda.and_then(|lambda| self.numbers.get(&(form, lambda)));
+        numbers.into_iter().flatten().map(|number| self.flow.running[*number].code).collect()
     }
 
     /// Returns the code that a task runs, calls included.
@@ -331,7 +362,7 @@ impl Maker<'_, '_> {
             name: "main".into(),
             kind: TaskKind::Main,
             place: CodePlace::default(),
-            causes: self.rows_of(&main),
+            causes: self.rows_of(&main, &tops),
             is_awaited: false,
             clauses: clauses_of(tops),
         }];
@@ -373,7 +404,7 @@ impl Maker<'_, '_> {
             name,
             kind: group.kind,
             place,
-            causes: self.rows_of(&group.leaving),
+            causes: self.rows_of(&group.leaving, &group.codes),
             is_awaited: group.is_awaited,
             clauses: clauses_of(group.codes),
         }));

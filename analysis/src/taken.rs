@@ -15,7 +15,7 @@ use crate::value::Code;
 impl Maker<'_, '_> {
     /// Returns the clauses, each with its form, its scope and its position.
     pub(crate) fn clauses(&self) -> Vec<((u32, usize, usize), ClauseRow)> {
-        type ClauseGroup = (BTreeSet<(FailureId, bool)>, u8, LeavingFailures);
+        type ClauseGroup = (BTreeSet<(FailureId, bool)>, u8, LeavingFailures, Vec<Code>);
         let mut groups: BTreeMap<(u32, usize, usize), ClauseGroup> = BTreeMap::new();
         for ((number, scope), handled) in &self.solution.handled {
             let code = self.flow.running[*number].code;
@@ -23,6 +23,7 @@ impl Maker<'_, '_> {
             for (position, taken) in handled.taken.iter().enumerate() {
                 let group = groups.entry((code.form, *scope, position)).or_default();
                 group.0.extend(taken);
+                group.3.push(code);
                 group.1 |= handled.mistakes[position];
                 if let ScopeKind::Recovery { procedures, .. } = &form.scopes[*scope].kind
                     && let Some(runner) = self.flow.number_of(Code { lambda: *procedures, ..code })
@@ -33,7 +34,7 @@ impl Maker<'_, '_> {
             }
         }
         let mut rows = Vec::new();
-        for ((form, scope, position), (taken, mistakes, fails)) in groups {
+        for ((form, scope, position), (taken, mistakes, fails, codes)) in groups {
             let text = &self.flow.forms.forms[form as usize];
             let mut never_ends = false;
             let (node, wanted, answer) = match &text.scopes[scope].kind {
@@ -59,7 +60,7 @@ impl Maker<'_, '_> {
             if !self.is_own(&place.source) {
                 continue;
             }
-            let mut causes = self.rows(taken.iter().map(|(failure, _)| *failure), mistakes);
+            let mut causes = self.rows(taken.iter().map(|(failure, _)| *failure), mistakes, &codes);
             for row in &mut causes {
                 let goes_on = taken.iter().any(|(failure, goes_on)| {
                     *goes_on && self.cause(self.solution.kinds[*failure as usize]) == row.cause
@@ -74,7 +75,7 @@ impl Maker<'_, '_> {
                 wanted,
                 answer,
                 causes,
-                fails: self.rows_of(&fails),
+                fails: self.rows_of(&fails, &codes),
                 span,
                 never_ends,
             };
