@@ -1,7 +1,7 @@
 //! Calls: of closures, of names, of functions of the library.
 
 use esl_bytecode::symbol::Symbol;
-use esl_compiler::core::{Lambda, NodeId};
+use esl_compiler::core::{Callee, Lambda, NodeId, NodeKind};
 
 use crate::effect::{FailureKind, NodeEffect, Reason, mistake};
 use crate::flow::{CallArguments, CallPoint, FlowWatcher, Passing, ValueFlow};
@@ -108,7 +108,7 @@ impl ValueFlow<'_> {
             FlowValue::Closure(code) => self.call_closure(point, code),
             FlowValue::Function(name) => self.call_by_name(point, name),
             FlowValue::Symbol(name) if point.symbols => self.call_by_name(point, name),
-            FlowValue::AnySymbol if point.symbols && point.passing == Passing::Through => {
+            FlowValue::AnySymbol if self.calls_a_value(point) => {
                 self.note(point.spot, NodeEffect::Fail(FailureKind::Any(Reason::Code)));
             }
             FlowValue::HowToStart => {
@@ -122,6 +122,17 @@ impl ValueFlow<'_> {
             }
             _ => {}
         }
+    }
+
+    /// Whether a call is one of a value that the program computes, as by `funcall`.
+    fn calls_a_value(&self, point: &CallPoint) -> bool {
+        let spot = point.spot;
+        point.symbols
+            && point.passing == Passing::Through
+            && matches!(
+                self.forms.forms[spot.form as usize].kind(spot.node),
+                NodeKind::Call(Callee::Value(_), _) | NodeKind::Apply(Callee::Value(_), _)
+            )
     }
 
     fn call_by_name(&mut self, point: &CallPoint, name: NameId) {

@@ -1,5 +1,5 @@
-//! Failures that begin in the modules of the system, as a program sees them: each begins at the calls of these
-//! modules through which it comes into the program's own code.
+//! Failures that begin in the modules of the system, as a program sees them: each begins at the calls of
+//! these modules through which it comes into the program's own code.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 

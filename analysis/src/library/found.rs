@@ -173,7 +173,8 @@ impl ValueFlow<'_> {
             NodeKind::Constant(datum) => Some(datum),
             _ => None,
         });
-        let has = |datum: &&Datum| symbols_inside(datum).iter().any(|symbol| symbol.name() == name);
+        let is_it = |symbol: &Symbol| !symbol.is_keyword() && symbol.name() == name;
+        let has = |datum: &&Datum| symbols_inside(datum).iter().any(is_it);
         constants.filter(has).cloned().collect()
     }
 }
