@@ -31,12 +31,14 @@ impl FoldedModules {
             let effects = flow.running[number].effects.iter();
             let codes = effects.flat_map(|(node, effect)| {
                 let codes: &[Code] = match effect {
-                    NodeEffect::FailAs(work) => &bodies[work.index()],
+                    NodeEffect::FailAs(work)
+                    | NodeEffect::FailByCauseOf(work)
+                    | NodeEffect::FailAll(work) => &bodies[work.index()],
                     effect => flow.called_by(effect),
                 };
                 codes.iter().filter_map(|code| Some((*node, flow.number_of(*code)?)))
             });
-            codes.filter(|(_, called)| of_module[flow.running[*called].code.form as usize]).collect()
+            codes.collect()
         };
         let direct = direct_failures(flow, solution, &of_module, &called);
         let mut entries: FxHashMap<FailureId, Vec<(usize, NodeId)>> = FxHashMap::default();
@@ -44,6 +46,7 @@ impl FoldedModules {
             if of_module[running.code.form as usize] {
                 continue;
             }
+            // Code of the program has no direct failures.
             for (node, called) in called(number) {
                 for failure in &direct[called] {
                     entries.entry(*failure).or_default().push((number, node));
@@ -84,12 +87,18 @@ fn direct_failures(
         if !of_module[running.code.form as usize] {
             continue;
         }
-        for (_, called) in called(number) {
-            callers[called].push(number);
+        let called = called(number);
+        for (_, called) in &called {
+            callers[*called].push(number);
         }
-        // Also in the clauses of the same function, which have code of their own.
-        let begins_here =
-            |failure: &&FailureId| solution.failures.keys[**failure as usize].form == running.code.form;
+        // Also in the clauses of the same function, which have code of their own, and where the failure of a
+        // task is another one of the same cause.
+        let begins_here = |failure: &&FailureId| {
+            let form = solution.failures.keys[**failure as usize].form;
+            let is_of_called =
+                |(_, called): &(NodeId, usize)| solution.leaving[*called].failures.contains(failure);
+            form == running.code.form || of_module[form as usize] && !called.iter().any(is_of_called)
+        };
         direct[number] = solution.leaving[number].failures.iter().filter(begins_here).copied().collect();
         pending.push(number);
     }

@@ -248,4 +248,8 @@ fn the_arm_has_the_failures_of_its_parts() {
         "{output}"
     );
     assert!(causes("note").is_empty(), "{output}");
+    // Failures of the module begin where the program calls it.
+    let (_, lines, _) = run(&folder, &["failures", "--fmea", "--format", "csv", &example]);
+    assert!(lines.contains("\r\nmove,:motion-failed,"), "{lines}");
+    assert!(!lines.contains("%ros-call"), "{lines}");
 }
