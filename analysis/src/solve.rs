@@ -390,7 +390,18 @@ impl Solution {
                 let fails = |work: &WorkId| !self.of_works[work.index()].failures.is_empty();
                 // Tasks of other forms may be among them where values are not told apart.
                 let is_mixed = flow.objects.are_mixed || !flow.many.places.is_empty();
-                let may_all_fail = tasks.iter().all(fails) || (is_mixed && tasks.iter().any(fails));
+                // Those that one place begins are the tasks of a form; others may have come along by data.
+                let mut forms: FxHashMap<Option<Spot>, bool> = FxHashMap::default();
+                for task in &tasks {
+                    let place = match flow.works[task.index()].key {
+                        WorkKey::Begun(spot, _) => Some(spot),
+                        _ => None,
+                    };
+                    *forms.entry(place).or_insert(true) &= fails(task);
+                }
+                let may_all_fail = tasks.is_empty()
+                    || forms.values().any(|fail| *fail)
+                    || (is_mixed && tasks.iter().any(fails));
                 if flow.forms.aborts || may_all_fail {
                     let failure = self.failure(FailureKind::Cause(cause), code.form, node);
                     leaving.failures.insert(failure);

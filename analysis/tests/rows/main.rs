@@ -429,3 +429,15 @@ fn a_task_has_all_clauses_of_a_form() {
     let table = table(&text);
     assert_eq!(table.tasks[0].clauses.len(), 100);
 }
+
+#[test]
+fn tasks_that_come_along_by_data_are_not_those_of_a_form() {
+    // The value of a clause for errors may stand for any that the form returns from inside.
+    check(
+        "(define-cause :a ())
+         (defun f () (or-parallel (one (partial-order ((two (fail :a)))))))
+         (defun g () (with-recovery-procedures ((:error (spawn (:name \"other\") 1))) (error \"no\")))
+         (f) (g)",
+        ":all-failed",
+    );
+}
