@@ -98,7 +98,7 @@ impl ValueFlow<'_> {
                 continue;
             };
             let first = match self.exact.contains(&thing) {
-                // Where elements are not told apart, each may be the first.
+                // If elements are not told apart, each may be the first.
                 false => contents,
                 true => {
                     let first = self.cell(CellKey::First(thing));

@@ -112,7 +112,7 @@ impl ValueFlow<'_> {
                 }
                 self.copy(signals, call.value);
             }
-            "SIGNAL" | "REPORT-PROGRESS" => {
+            "SIGNAL" | "SIGNAL-EVENT" | "REPORT-PROGRESS" => {
                 let signals = self.cell(CellKey::Signals);
                 self.store_all(call, signals);
                 // `signal` is also that of conditions.

@@ -80,7 +80,10 @@ impl TypeWalk<'_> {
         {
             let given = self.variable(*variable, otherwise).types;
             let need = ArgumentNeed::of_types(type_of(declared, self.definitions));
-            self.warn(no, REFUSED, *value, given, &need);
+            // A slot without values is refused whenever an instance is made: the definition alone is right.
+            if !need.types.is_empty() {
+                self.warn(no, REFUSED, *value, given, &need);
+            }
         }
     }
 }

@@ -70,6 +70,16 @@ fn failures_signals_and_reports_have_arguments() {
 }
 
 #[test]
+fn both_names_of_signals_pass_arguments() {
+    for name in ["signal", "signal-event"] {
+        ends(&format!(
+            "(defvar *e* (make-event)) (spawn (sleep 1) ({name} *e* (lambda () (fail :boo))))
+             (funcall (wait-for-event *e*))"
+        ));
+    }
+}
+
+#[test]
 fn restarts_call_their_functions() {
     ends("(restart-bind ((r (lambda () (fail :boo)))) (invoke-restart 'r))");
     ends("(restart-bind ((r (lambda (f) (funcall f)))) (invoke-restart 'r (lambda () (fail :boo))))");

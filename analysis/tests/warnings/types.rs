@@ -182,6 +182,7 @@ fn slots_have_their_declared_types() {
     check_none_with(
         "(defun f (w x) (setf (wheel-radius w) x) (setf (wheel-any w) 'a) (make-wheel :radius x))",
     );
+    check_none("(defstruct none (slot nil :type nil)) (print 1)");
     // Old instances, structures that are defined twice, and values in the place of those that are refused.
     check_none_with("(load \"wheels.esl\") (defun f (w) (length (wheel-radius w)))");
     check_none_with("(define-upgrade (wheel) (old) (make-wheel :radius (length (wheel-radius old))))");
